@@ -1,0 +1,1 @@
+"""From a run's bag to its figures, tables and pictures."""

@@ -1,0 +1,136 @@
+"""Take a run's record out of a bag: the only place where the analysis meets messages."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robot_formation import names
+from robot_formation.analysis.errors import AnalysisError
+from robot_formation.analysis.record import FollowerRecord, Ground, RunRecord, Stamped, Track
+from robot_formation.bag.reader import Bag, read_bag
+from robot_formation.control.motion import Motion
+
+METADATA_RECORD = "robot_formation"
+"""MCAP metadata record in which a run says what it is (scenario, seed, predictor, surface, timesteps, ...)."""
+
+_TRIANGLE_LIST = 11
+_MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
+
+
+def load_run(path: str | Path) -> RunRecord:
+    """Read a run's bag, finished or not.
+
+    Raises:
+        BagError: the bag is missing, no bag, empty or corrupted.
+        AnalysisError: the bag has no run of a formation.
+    """
+    with read_bag(path) as bag:
+        return run_record(bag)
+
+
+def run_record(bag: Bag) -> RunRecord:
+    """Take a run's record out of an open bag.
+
+    Raises:
+        BagError: the bag is corrupted, or a topic has another message type than a run's.
+        AnalysisError: the bag has no run of a formation.
+    """
+    robots = _robots(bag)
+    wanted = _topics(robots)
+    bag.require({topic: type_name for topic, type_name in wanted.items() if topic in bag.topics})
+    messages: dict[str, list[Any]] = defaultdict(list)
+    for message in bag.messages(wanted):
+        messages[message.topic].append(message.message)
+    markers = messages[_absolute(names.SURFACE.name)]
+    tracks = {robot: _track(messages[_absolute(names.ground_truth_odom(robot).name)]) for robot in robots}
+    return RunRecord(
+        leader_moved=_stamped(messages[f"/{names.LEADER}/{names.MOVED.name}"]),
+        followers=tuple(_follower(robot, messages) for robot in robots if robot != names.LEADER),
+        tracks={robot: track for robot, track in tracks.items() if track is not None},
+        simulated_s=bag.duration_s,
+        details=bag.metadata(METADATA_RECORD),
+        ground=_ground(markers[-1]) if markers else None,
+    )
+
+
+def _robots(bag: Bag) -> list[str]:
+    """Find the robots by their topics: the leader, then the followers by number."""
+    topics = "|".join(topic.name for topic in (*_MOTIONS, names.ALIGNMENT))
+    found = {match[1] for topic in bag.topics if (match := re.fullmatch(rf"/follower_([1-9]\d*)/(?:{topics})", topic))}
+    if not found:
+        raise AnalysisError(
+            f"{bag.path} has no formation run: no topic /{names.follower(1)}/{names.MOVED.name} and the like; "
+            "give the bag of 'formation run' or record all topics"
+        )
+    return [names.LEADER, *(names.follower(number) for number in sorted(int(number) for number in found))]
+
+
+def _topics(robots: Sequence[str]) -> dict[str, str]:
+    """Name the topics that the analysis reads, with their message types."""
+    topics = {_absolute(names.SURFACE.name): names.SURFACE.type}
+    for robot in robots:
+        odom = names.ground_truth_odom(robot)
+        topics[_absolute(odom.name)] = odom.type
+        topics.update({f"/{robot}/{topic.name}": topic.type for topic in (*_MOTIONS, names.ALIGNMENT)})
+    return topics
+
+
+def _absolute(name: str) -> str:
+    return name if name.startswith("/") else f"/{name}"
+
+
+def _follower(robot: str, messages: dict[str, list[Any]]) -> FollowerRecord:
+    moved, displacements, residuals, predictions = (_stamped(messages[f"/{robot}/{topic.name}"]) for topic in _MOTIONS)
+    states = tuple(message.data for message in messages[f"/{robot}/{names.ALIGNMENT.name}"])
+    return FollowerRecord(robot, moved, displacements, residuals, predictions, states)
+
+
+def _stamped(messages: Sequence[Any]) -> tuple[Stamped, ...]:
+    """Turn PoseWithCovarianceStamped messages into stamped displacements."""
+    return tuple(Stamped(_stamp_ns(message), _motion(message.pose.pose)) for message in messages)
+
+
+def _stamp_ns(message: Any) -> int:
+    stamp = message.header.stamp
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
+def _motion(pose: Any) -> Motion:
+    return Motion(float(pose.position.x), float(pose.position.y), _yaw(pose.orientation))
+
+
+def _yaw(quaternion: Any) -> float:
+    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
+    return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+def _track(messages: Sequence[Any]) -> Track | None:
+    """Turn Odometry messages into a true path, in order of their stamps."""
+    if not messages:
+        return None
+    poses = [message.pose.pose for message in messages]
+    stamps = np.array([_stamp_ns(message) for message in messages], dtype=np.int64)
+    positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
+    yaws = np.array([_yaw(pose.orientation) for pose in poses])
+    order = np.argsort(stamps, kind="stable")
+    return Track(stamps[order], positions[order], yaws[order])
+
+
+def _ground(marker: Any) -> Ground | None:
+    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices."""
+    if marker.type != _TRIANGLE_LIST or len(marker.points) < 3:
+        return None
+    corners = np.array([(point.x, point.y, point.z) for point in marker.points])
+    scale = np.array([marker.scale.x, marker.scale.y, marker.scale.z])
+    origin = marker.pose.position
+    corners = corners * scale + (origin.x, origin.y, origin.z)
+    vertices, numbers = np.unique(corners.round(6), axis=0, return_inverse=True)
+    count = len(corners) // 3
+    return Ground(vertices, numbers.reshape(-1)[: 3 * count].reshape(count, 3))

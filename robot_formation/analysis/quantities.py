@@ -1,0 +1,248 @@
+"""The project's quantities, per timestep and of a whole run, from plain records.
+
+displacement
+    net displacement of a timestep by the follower's encoder wheels, in its frame at the timestep's start.
+correction distance
+    sum of |component| over the moves after the prediction move, realised by the encoder wheels; of a run: over the
+    finished timesteps from 4 on (after the collection phase).
+formation error
+    |e| with e = p_F - p_B - R(psi_B)(0, -d): actual minus desired place of base_link in world x, y when the follower
+    reports (ground truth), d to the right of the beacon neighbour B (0.32 m by default). Over the timesteps: RMSE of
+    |e|; bias, the mean of e in B's frame as u and v; scatter, the RMS distance from it. RMSE^2 = bias^2 + scatter^2.
+heading error
+    psi_F - psi_B, between -pi and pi.
+
+What is unavailable is None. Frames and signs: v = +x (forward), u = -y (to the right); turns are apart, in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation.analysis.errors import AnalysisError
+from robot_formation.analysis.record import FollowerRecord, RunRecord, Stamped
+from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
+from robot_formation.control.motion import Motion
+from robot_formation.names import beacon_neighbour
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """Moves after the prediction move: summed |u| and |v| in metres, summed |turn| in radians, their number."""
+
+    u_m: float
+    v_m: float
+    turn_rad: float
+    movements: int
+
+
+@dataclass(frozen=True)
+class Timestep:
+    """A finished timestep of one follower. `error_uv_m` is the formation error as a vector in B's frame, metres."""
+
+    t: int
+    predicted: Motion | None
+    moved: Motion
+    corrections: Corrections
+    residual: Motion | None
+    error_uv_m: tuple[float, float] | None
+    heading_error_rad: float | None
+
+    @property
+    def formation_error_m(self) -> float | None:
+        """Length of the formation error, metres."""
+        return math.hypot(*self.error_uv_m) if self.error_uv_m is not None else None
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the timestep as the command line's JSON has it."""
+        return {
+            "t": self.t,
+            "predicted_u_m": self.predicted.u_m if self.predicted else None,
+            "predicted_v_m": self.predicted.v_m if self.predicted else None,
+            "moved_u_m": self.moved.u_m,
+            "moved_v_m": self.moved.v_m,
+            "correction_u_m": self.corrections.u_m,
+            "correction_v_m": self.corrections.v_m,
+            "residual_u_m": self.residual.u_m if self.residual else None,
+            "residual_v_m": self.residual.v_m if self.residual else None,
+            "movements": self.corrections.movements,
+            "formation_error_m": self.formation_error_m,
+            "heading_error_rad": self.heading_error_rad,
+        }
+
+
+@dataclass(frozen=True)
+class FollowerAnalysis:
+    """A follower's finished timesteps, its totals, and what happened in a timestep that it didn't finish."""
+
+    name: str
+    lost: bool
+    timesteps: tuple[Timestep, ...]
+    unfinished: Corrections | None
+    totals: dict[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the timesteps and totals as the command line's JSON has them."""
+        return {"timesteps": [timestep.to_json() for timestep in self.timesteps], "totals": self.totals}
+
+
+@dataclass(frozen=True)
+class RunAnalysis:
+    """A run's scenario, outcome (done, lost or incomplete) and followers."""
+
+    scenario: str | None
+    outcome: str
+    followers: tuple[FollowerAnalysis, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the command line's JSON: the first follower's, and each one's where there are several."""
+        result = {"scenario": self.scenario, "outcome": self.outcome, **self.followers[0].to_json()}
+        if len(self.followers) > 1:
+            result["followers"] = {follower.name: follower.to_json() for follower in self.followers}
+        return result
+
+
+def analyse(record: RunRecord) -> RunAnalysis:
+    """Work out a run's quantities.
+
+    Raises:
+        AnalysisError: the record has no follower, or more finished timesteps than moves of the leader.
+    """
+    if not record.followers:
+        raise AnalysisError("the run has no follower; give the record of a formation run")
+    followers = tuple(analyse_follower(record, follower) for follower in record.followers)
+    return RunAnalysis(record.details.get("scenario"), _outcome(record, followers), followers)
+
+
+def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAnalysis:
+    """Work out one follower's timesteps and totals.
+
+    Raises:
+        AnalysisError: there are more finished timesteps than moves of the leader (the record's start is missing).
+    """
+    finished, opened = len(follower.displacements), len(record.leader_moved)
+    if finished > opened:
+        raise AnalysisError(
+            f"{follower.name} finished {finished} timesteps but the leader moved {opened} times: "
+            "the record's start is missing; record the run from its beginning"
+        )
+    timesteps = tuple(_timestep(record, follower, t) for t in range(1, finished + 1))
+    unfinished = _corrections(record, follower, finished + 1) if opened > finished else None
+    values = totals(timesteps)
+    values["timesteps_finished"] = finished
+    values["timesteps_planned"] = record.timesteps_planned
+    values["unfinished_timestep"] = None
+    if unfinished is not None:
+        values["unfinished_timestep"] = {
+            "t": finished + 1,
+            "correction_u_m": unfinished.u_m,
+            "correction_v_m": unfinished.v_m,
+            "correction_turn_rad": unfinished.turn_rad,
+            "movements": unfinished.movements,
+        }
+    values["path_length_m"] = {robot: track.length_m for robot, track in record.tracks.items()}
+    values["simulated_seconds"] = record.simulated_s
+    return FollowerAnalysis(follower.name, follower.lost, timesteps, unfinished, values)
+
+
+def totals(timesteps: Sequence[Timestep]) -> dict[str, Any]:
+    """Sum up timesteps: correction distances from timestep 4 on, movements, formation and heading errors."""
+    counted = [timestep.corrections for timestep in timesteps if timestep.t > COLLECTION_TIMESTEPS]
+    u_m = sum(correction.u_m for correction in counted)
+    v_m = sum(correction.v_m for correction in counted)
+    turn_rad = sum(correction.turn_rad for correction in counted)
+    movements = sum(timestep.corrections.movements for timestep in timesteps)
+    errors = np.array([timestep.error_uv_m for timestep in timesteps if timestep.error_uv_m is not None])
+    headings = np.array([t.heading_error_rad for t in timesteps if t.heading_error_rad is not None])
+    return {
+        "correction_m": u_m + v_m if counted else None,
+        "correction_u_m": u_m if counted else None,
+        "correction_v_m": v_m if counted else None,
+        "correction_turn_rad": turn_rad if counted else None,
+        "movements": movements,
+        "movements_per_timestep": movements / len(timesteps) if timesteps else None,
+        **_error_statistics(errors),
+        "heading_error_rmse_rad": float(np.sqrt(np.mean(headings**2))) if headings.size else None,
+    }
+
+
+def formation_error_uv_m(
+    position_f: NDArray[np.float64], position_b: NDArray[np.float64], yaw_b: float, distance_m: float
+) -> tuple[float, float]:
+    """Formation error (u, v) in the beacon neighbour's frame, metres; positions (2,) are world x, y in metres."""
+    dx, dy = position_f - position_b
+    cosine, sine = math.cos(yaw_b), math.sin(yaw_b)
+    forward, left = cosine * dx + sine * dy, -sine * dx + cosine * dy
+    return -(left + distance_m), forward
+
+
+def corrections_of(moves: Sequence[Stamped]) -> Corrections:
+    """Sum up a timestep's moves without the first, which is the prediction move."""
+    motions = [move.motion for move in moves[1:]]
+    return Corrections(
+        u_m=sum(abs(motion.u_m) for motion in motions),
+        v_m=sum(abs(motion.v_m) for motion in motions),
+        turn_rad=sum(abs(motion.yaw_rad) for motion in motions),
+        movements=len(motions),
+    )
+
+
+def _timestep(record: RunRecord, follower: FollowerRecord, t: int) -> Timestep:
+    displacement = follower.displacements[t - 1]
+    residual = follower.residuals[t - 1].motion if t <= len(follower.residuals) else None
+    predicted = follower.predictions[t - 2].motion if 2 <= t <= len(follower.predictions) + 1 else None
+    error_uv, heading_error = _ground_truth(record, follower.name, displacement.stamp_ns)
+    return Timestep(
+        t=t,
+        predicted=predicted if predicted and predicted.finite else None,
+        moved=displacement.motion,
+        corrections=_corrections(record, follower, t),
+        residual=residual if residual and residual.finite else None,
+        error_uv_m=error_uv,
+        heading_error_rad=heading_error,
+    )
+
+
+def _corrections(record: RunRecord, follower: FollowerRecord, t: int) -> Corrections:
+    """Sum up the corrections of timestep t: from the leader's t-th move to the t-th displacement, if that exists."""
+    start_ns = record.leader_moved[t - 1].stamp_ns
+    end_ns = follower.displacements[t - 1].stamp_ns if t <= len(follower.displacements) else math.inf
+    return corrections_of([move for move in follower.moved if start_ns < move.stamp_ns <= end_ns])
+
+
+def _ground_truth(record: RunRecord, robot: str, stamp_ns: int) -> tuple[tuple[float, float] | None, float | None]:
+    """Return the formation error (u, v) in metres and the heading error in radians at a stamp, where they are known."""
+    own = record.tracks.get(robot)
+    other = record.tracks.get(beacon_neighbour(robot))
+    pose_f = own.at(stamp_ns) if own else None
+    pose_b = other.at(stamp_ns) if other else None
+    if pose_f is None or pose_b is None:
+        return None, None
+    heading_error = math.remainder(pose_f[1] - pose_b[1], math.tau)
+    return formation_error_uv_m(pose_f[0], pose_b[0], pose_b[1], record.formation_distance_m), heading_error
+
+
+def _error_statistics(errors_uv_m: NDArray[np.float64]) -> dict[str, float | None]:
+    names = ("rmse_m", "bias_u_m", "bias_v_m", "scatter_m")
+    values: list[float | None] = [None] * len(names)
+    if errors_uv_m.size:
+        bias = errors_uv_m.mean(axis=0)
+        rmse = float(np.sqrt(np.mean(np.sum(errors_uv_m**2, axis=1))))
+        scatter = float(np.sqrt(np.mean(np.sum((errors_uv_m - bias) ** 2, axis=1))))
+        values = [rmse, float(bias[0]), float(bias[1]), scatter]
+    return {f"formation_error_{name}": value for name, value in zip(names, values, strict=True)}
+
+
+def _outcome(record: RunRecord, followers: Sequence[FollowerAnalysis]) -> str:
+    if any(follower.lost for follower in followers) or record.details.get("outcome") == "lost":
+        return "lost"
+    planned = record.timesteps_planned
+    if planned is None:
+        return "incomplete" if any(follower.unfinished is not None for follower in followers) else "done"
+    return "done" if all(len(follower.timesteps) >= planned for follower in followers) else "incomplete"

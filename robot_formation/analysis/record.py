@@ -1,0 +1,116 @@
+"""What is known of a run after it ended, wherever it comes from: a bag or the in-process runner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation.control.motion import Motion
+
+FORMATION_DISTANCE_M = 0.32
+"""Distance between base_link origins in formation, along u (paper, with the axes read as side by side)."""
+
+
+@dataclass(frozen=True)
+class Stamped:
+    """A displacement and the simulated time it is a fact of, nanoseconds."""
+
+    stamp_ns: int
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class Track:
+    """True poses of a robot's base_link in the world, in order of time.
+
+    Attributes:
+        stamps_ns: (n,) nanoseconds.
+        positions_m: (n, 3) x, y, z.
+        yaws_rad: (n,) heading, anticlockwise from world x.
+    """
+
+    stamps_ns: NDArray[np.int64]
+    positions_m: NDArray[np.float64]
+    yaws_rad: NDArray[np.float64]
+
+    def at(self, stamp_ns: int) -> tuple[NDArray[np.float64], float] | None:
+        """Return x and y (2,) in metres and the heading in radians of the last pose at or before the stamp, if any."""
+        index = int(np.searchsorted(self.stamps_ns, stamp_ns, side="right")) - 1
+        return (self.positions_m[index, :2], float(self.yaws_rad[index])) if index >= 0 else None
+
+    @property
+    def length_m(self) -> float:
+        """Length of the path on the ground, metres."""
+        return float(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True)
+class FollowerRecord:
+    """A follower's part of a run.
+
+    Attributes:
+        name: follower_1, follower_2, ...
+        moved: every move by its encoder wheels, stamped with its end.
+        displacements: one per finished timestep.
+        residuals: one per finished timestep: desired minus actual position as the camera estimates it; NaN if unseen.
+        predictions: the k-th is for timestep k + 1.
+        states: what its fine-tuner said, in order.
+    """
+
+    name: str
+    moved: tuple[Stamped, ...] = ()
+    displacements: tuple[Stamped, ...] = ()
+    residuals: tuple[Stamped, ...] = ()
+    predictions: tuple[Stamped, ...] = ()
+    states: tuple[str, ...] = ()
+
+    @property
+    def lost(self) -> bool:
+        """Whether it lost its beacon neighbour from view."""
+        return any(state.split(":")[0] == "lost" for state in self.states)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The surface as a mesh: vertices (n, 3) in world metres, triangles (m, 3) of vertex numbers."""
+
+    vertices_m: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """A run.
+
+    Attributes:
+        leader_moved: the leader's moves; the k-th opens timestep k.
+        followers: by number.
+        tracks: true path by robot; may be empty.
+        simulated_s: simulated seconds from the first to the last record.
+        details: what the run says of itself (scenario, seed, predictor, surface, timesteps, ...), as text.
+        ground: the surface's mesh if it is known.
+    """
+
+    leader_moved: tuple[Stamped, ...]
+    followers: tuple[FollowerRecord, ...]
+    tracks: Mapping[str, Track] = field(default_factory=dict)
+    simulated_s: float = 0.0
+    details: Mapping[str, str] = field(default_factory=dict)
+    ground: Ground | None = None
+
+    @property
+    def timesteps_planned(self) -> int | None:
+        """Timesteps that the scenario has, if the run says."""
+        text = self.details.get("timesteps", "")
+        return int(text) if text.isdigit() else None
+
+    @property
+    def formation_distance_m(self) -> float:
+        """Distance between neighbours in formation, metres: what the run says, else the paper's."""
+        try:
+            return float(self.details["formation_distance_m"])
+        except (KeyError, ValueError):
+            return FORMATION_DISTANCE_M

@@ -1,0 +1,136 @@
+"""A run's analysis as text for the terminal, as strict JSON, and as pictures in a folder."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from robot_formation.analysis.errors import AnalysisError
+from robot_formation.analysis.figures import draw_corrections, draw_trajectory
+from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, Timestep
+from robot_formation.analysis.record import RunRecord
+from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
+from robot_formation.control.motion import Motion
+
+_HEADERS = (
+    ("", "predicted", "moved", "correction", "residual", "moves", "formation", "heading"),
+    ("t", "u      v", "u      v", "u      v", "u      v", "", "error", "error"),
+    ("", "cm", "cm", "cm", "cm", "", "cm", "deg"),
+)
+_WIDTHS = (3, 13, 13, 13, 13, 6, 10, 8)
+_NONE = "-"
+
+
+def to_json(analysis: RunAnalysis) -> str:
+    """Return the analysis in the command line's JSON shape, without NaN."""
+    return json.dumps(analysis.to_json(), indent=2, allow_nan=False)
+
+
+def text_report(record: RunRecord, analysis: RunAnalysis) -> str:
+    """Return the tables and totals, centimetres and degrees, u to the right and v forward."""
+    said = [f"{key} {record.details[key]}" for key in ("predictor", "surface", "seed") if record.details.get(key)]
+    head = f"{analysis.scenario or 'formation run'}{': ' if said else ''}{', '.join(said)}"
+    sections = [head]
+    for follower in analysis.followers:
+        if len(analysis.followers) > 1:
+            sections.append(follower.name.replace("_", " "))
+        sections.append("\n".join(_table(follower)))
+        sections.append("\n".join(_totals(follower)))
+    sections.append(f"outcome: {analysis.outcome}")
+    return "\n\n".join(sections)
+
+
+def write_pictures(record: RunRecord, analysis: RunAnalysis, folder: str | Path) -> list[Path]:
+    """Draw the run's pictures into a folder, made if it is missing; pictures of an older analysis are replaced.
+
+    Raises:
+        AnalysisError: the folder or a picture can't be written.
+    """
+    out = Path(folder)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AnalysisError(f"{out} can't be made: {error.strerror or error}; choose another folder") from error
+    return [
+        draw_trajectory(record, analysis, out / "trajectory.png"),
+        draw_corrections(record, analysis, out / "corrections.png"),
+    ]
+
+
+def _table(follower: FollowerAnalysis) -> list[str]:
+    lines = [_line(header) for header in _HEADERS]
+    lines.append("-" * (sum(_WIDTHS) + 2 * (len(_WIDTHS) - 1)))
+    return lines + [_line(_cells(timestep)) for timestep in follower.timesteps]
+
+
+def _cells(timestep: Timestep) -> tuple[str, ...]:
+    corrections = timestep.corrections
+    return (
+        str(timestep.t),
+        _uv(timestep.predicted),
+        _uv(timestep.moved),
+        _pair(corrections.u_m, corrections.v_m),
+        _uv(timestep.residual),
+        str(corrections.movements),
+        _scaled(timestep.formation_error_m, 100.0),
+        _scaled(timestep.heading_error_rad, math.degrees(1.0)),
+    )
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "  ".join(cell.rjust(width) for cell, width in zip(cells, _WIDTHS, strict=True)).rstrip()
+
+
+def _uv(motion: Motion | None) -> str:
+    return _NONE if motion is None else _pair(motion.u_m, motion.v_m)
+
+
+def _pair(u_m: float, v_m: float) -> str:
+    return f"{_scaled(u_m, 100.0)} {_scaled(v_m, 100.0):>6}"
+
+
+def _scaled(value: float | None, scale: float) -> str:
+    # Adding zero turns a rounded -0.0 into 0.0.
+    return _NONE if value is None else f"{round(value * scale, 2) + 0.0:.2f}"
+
+
+def _totals(follower: FollowerAnalysis) -> list[str]:
+    values = follower.totals
+    planned = values["timesteps_planned"]
+    said: list[tuple[str, str]] = [
+        ("timesteps finished", f"{values['timesteps_finished']}{'' if planned is None else f' of {planned}'}"),
+        (f"correction distance from timestep {COLLECTION_TIMESTEPS + 1}", _correction(values)),
+        ("correction moves", _movements(values)),
+        ("formation error", _formation_error(values)),
+        ("heading error", f"RMSE {_scaled(values['heading_error_rmse_rad'], math.degrees(1.0))} deg"),
+        ("path", ", ".join(f"{robot} {length:.3f} m" for robot, length in values["path_length_m"].items()) or _NONE),
+        ("simulated time", f"{values['simulated_seconds']:.1f} s"),
+    ]
+    unfinished = values["unfinished_timestep"]
+    if unfinished:
+        u, v = (_scaled(unfinished[key], 100.0) for key in ("correction_u_m", "correction_v_m"))
+        moves = unfinished["movements"]
+        said.insert(1, ("unfinished timestep", f"{unfinished['t']}: {moves} correction moves (u {u}, v {v} cm)"))
+    width = max(len(name) for name, _ in said)
+    return [f"{name.ljust(width)}  {value}" for name, value in said]
+
+
+def _correction(values: dict[str, Any]) -> str:
+    if values["correction_m"] is None:
+        return _NONE
+    u, v, both = (_scaled(values[key], 100.0) for key in ("correction_u_m", "correction_v_m", "correction_m"))
+    return f"{both} cm (u {u}, v {v}), turns {_scaled(values['correction_turn_rad'], math.degrees(1.0))} deg"
+
+
+def _movements(values: dict[str, Any]) -> str:
+    per_timestep = values["movements_per_timestep"]
+    return f"{values['movements']}{'' if per_timestep is None else f' ({per_timestep:.2f} per timestep)'}"
+
+
+def _formation_error(values: dict[str, Any]) -> str:
+    keys = ("rmse_m", "bias_u_m", "bias_v_m", "scatter_m")
+    rmse, bias_u, bias_v, scatter = (_scaled(values[f"formation_error_{key}"], 100.0) for key in keys)
+    return f"RMSE {rmse} cm (bias u {bias_u}, v {bias_v}; scatter {scatter})"

@@ -1,0 +1,85 @@
+"""Records a stream of raw messages: finds their simulated time, and closes chunks so that a killed recorder loses little."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+from robot_formation.bag.definitions import jazzy_typestore
+from robot_formation.bag.qos import TopicQos
+from robot_formation.bag.writer import BagWriter
+
+_CHUNK_BYTES = 1 << 20
+_TIME_FIRST = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+METADATA_NAME = "robot_formation"
+
+
+class Recorder:
+    """Writes messages into a bag. Their log time is simulated: their own stamp, or the latest one seen before them."""
+
+    def __init__(self, path: Path, metadata: Mapping[str, str]) -> None:
+        """Open the bag.
+
+        Raises:
+            BagError: if the path is taken or can't be written.
+        """
+        self._writer = BagWriter(path)
+        if metadata:
+            self._writer.write_metadata(METADATA_NAME, metadata)
+        self._topics: set[str] = set()
+        self._now_ns = 0
+        self._pending_bytes = 0
+
+    @property
+    def topics(self) -> set[str]:
+        """Names of the topics recorded so far."""
+        return self._topics
+
+    @property
+    def message_count(self) -> int:
+        """Messages recorded so far."""
+        return self._writer.message_count
+
+    def add_topic(self, name: str, type_name: str, qos: TopicQos) -> None:
+        """Declare a topic once."""
+        self._writer.add_topic(name, type_name, qos)
+        self._topics.add(name)
+
+    def record(self, topic: str, type_name: str, cdr: bytes) -> None:
+        """Write one serialised message of a declared topic."""
+        stamp_ns = own_stamp(type_name, cdr)
+        if stamp_ns is None:
+            stamp_ns = self._now_ns
+        else:
+            self._now_ns = max(self._now_ns, stamp_ns)
+        self._writer.write(topic, cdr, stamp_ns)
+        self._pending_bytes += len(cdr)
+        if self._pending_bytes > _CHUNK_BYTES:
+            self.end_chunk()
+
+    def end_chunk(self) -> None:
+        """Make what was recorded so far survive the recorder's death."""
+        if self._pending_bytes:
+            self._writer.end_chunk()
+            self._pending_bytes = 0
+
+    def close(self) -> Path:
+        """Finish the bag; return its path."""
+        return self._writer.close()
+
+
+@cache
+def _has_time_first(type_name: str) -> bool:
+    fields = jazzy_typestore().fielddefs[type_name][1]
+    return bool(fields) and fields[0][1][1] in _TIME_FIRST
+
+
+def own_stamp(type_name: str, cdr: bytes) -> int | None:
+    """Read the time that a message begins with, in nanoseconds; None if its type has none or it is negative."""
+    if not _has_time_first(type_name) or len(cdr) < 12:
+        return None
+    order = "little" if cdr[1] & 1 else "big"
+    seconds = int.from_bytes(cdr[4:8], order, signed=True)  # type: ignore[arg-type]
+    nanoseconds = int.from_bytes(cdr[8:12], order)  # type: ignore[arg-type]
+    return seconds * 1_000_000_000 + nanoseconds if seconds >= 0 else None

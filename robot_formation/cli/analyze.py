@@ -1,0 +1,48 @@
+"""`formation analyze`: a run's table, totals and pictures from its bag, without ROS."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+DESCRIPTION = """\
+Print a run's timesteps and totals and draw its pictures (trajectory.png, corrections.png). BAG is a bag's folder, a
+single .mcap file, or the .partial folder of a run that was killed. Lengths are along u (to the right) and v (forward).
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("analyze", help="table, totals and pictures of a run's bag", description=DESCRIPTION)
+    parser.add_argument("bag", metavar="BAG", type=Path, help="bag to analyse")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="folder for the pictures (default: <BAG>_analysis)")
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON and nothing else; pictures are drawn only if --out is given"
+    )
+    parser.add_argument("--no-pictures", action="store_true", help="draw no pictures")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Analyse a bag; return 0, also for a run that lost its leader.
+
+    Raises:
+        FormationError: the bag can't be read or has no run, or the pictures can't be written.
+    """
+    # Imported here, so that the other verbs don't pay for rosbags.
+    from robot_formation.analysis.from_bag import load_run
+    from robot_formation.analysis.quantities import analyse
+    from robot_formation.analysis.report import text_report, to_json, write_pictures
+    from robot_formation.bag.reader import bag_name
+
+    record = load_run(args.bag)
+    analysis = analyse(record)
+    print(to_json(analysis) if args.json else text_report(record, analysis))
+    if args.no_pictures or (args.json and args.out is None):
+        return 0
+    folder = args.out or args.bag.resolve().with_name(f"{bag_name(args.bag)}_analysis")
+    pictures = write_pictures(record, analysis, folder)
+    if not args.json:
+        print("\npictures: " + ", ".join(str(picture) for picture in pictures))
+    return 0

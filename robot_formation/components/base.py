@@ -1,0 +1,115 @@
+"""A node's body without rclpy: what it listens to, what it sends, what it does.
+
+The node graph hosts a component in an rclpy node (nodes/host.py), the in-process runner on a queue
+(experiment/in_process.py). Both hand it the same messages, so both give the same run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from robot_formation.names import Topic
+
+Handler = Callable[[Any], None]
+
+
+@dataclass(frozen=True)
+class Input:
+    """A subscription: the topic and the method that takes its messages."""
+
+    topic: Topic
+    handler: Handler
+
+
+@dataclass(frozen=True)
+class Health:
+    """What a component says of itself on /diagnostics: level 0 OK, 1 warning, 2 error."""
+
+    level: int
+    text: str
+    values: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a component runs: its robot ('' for the run's own nodes) and the namespace of the formation's ticks."""
+
+    robot: str
+    formation: str = "/formation"
+
+    def frame(self, name: str) -> str:
+        """Name one of the robot's frames."""
+        return f"{self.robot}/{name}" if self.robot else name
+
+
+class Component:
+    """Base of all components. The host calls `attach` once, then `start`, then the inputs' handlers in order.
+
+    A component that has finished sets `exit_code`; its host then ends with it.
+    """
+
+    def __init__(self, place: Place) -> None:
+        self.place = place
+        self.exit_code: int | None = None
+        self.exit_reason = ""
+        self.stamp_ns = 0
+        self._send: Callable[[Topic, Any], None] = _not_attached
+        self._say: Callable[[int, str], None] = lambda level, text: None
+        self._warnings = 0
+        self._last_warning = ""
+
+    def attach(self, send: Callable[[Topic, Any], None], say: Callable[[int, str], None]) -> None:
+        """Connect the component: `send(topic, message)` publishes, `say(level, text)` logs (0 info, 1 warning, 2 error)."""
+        self._send = send
+        self._say = say
+
+    def inputs(self) -> list[Input]:
+        """List the subscriptions."""
+        return []
+
+    def outputs(self) -> list[Topic]:
+        """List the topics that may be sent."""
+        return []
+
+    def services(self) -> dict[str, Callable[[], tuple[bool, str]]]:
+        """List the std_srvs/Trigger services by relative name; each returns success and a message."""
+        return {}
+
+    def start(self) -> None:
+        """Begin: called once after everything is connected."""
+
+    def listened_to(self, topic: Topic, listeners: int) -> None:
+        """Take note of how many listen to an output that is worth making only for somebody."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether `work` has something to do without any further message. Only the world ever has."""
+        return False
+
+    def work(self) -> None:
+        """Do the next piece of what is owed."""
+
+    def health(self) -> Health:
+        """Report what /diagnostics shows; by default the last warning."""
+        values = {"warnings": str(self._warnings), **self.details()}
+        return Health(1 if self._warnings else 0, self._last_warning or "ok", values)
+
+    def details(self) -> dict[str, str]:
+        """List what /diagnostics shows beside the warnings."""
+        return {}
+
+    def warn(self, text: str) -> None:
+        """Log a warning, count it and show it on /diagnostics."""
+        self._warnings += 1
+        self._last_warning = text
+        self._say(1, text)
+
+    def finish(self, exit_code: int, reason: str) -> None:
+        """End the component's work; its host ends in good order."""
+        self.exit_code, self.exit_reason = exit_code, reason
+
+
+def _not_attached(topic: Topic, message: Any) -> None:
+    raise RuntimeError(f"nothing is connected to {topic.name}")

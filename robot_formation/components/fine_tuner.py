@@ -1,0 +1,96 @@
+"""Fine-tuner: moves by the prediction, looks, corrects and reports the timestep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robot_formation import conversions, names
+from robot_formation.components.base import Component, Input, Place
+from robot_formation.control import fine_tuner as core
+from robot_formation.control.motion import Motion
+from robot_formation.parameters import parameter
+
+LOST_EXIT_CODE = 3
+
+
+@dataclass(frozen=True)
+class FineTunerNodeParameters(core.FineTunerParameters):
+    """The fine-tuner's parameters and who listens to its tick."""
+
+    done_listeners: int = parameter(
+        1, "Nodes that wait for this follower's tick: the leader, and the follower behind if there is one", low=0, high=10
+    )
+
+
+class FineTunerComponent(Component):
+    """Hosts the follower's state machine."""
+
+    def __init__(self, parameters: FineTunerNodeParameters, place: Place) -> None:
+        super().__init__(place)
+        self._tuner = core.FineTuner(parameters)
+        self._neighbour = names.formation_done(names.beacon_neighbour(place.robot), place.formation)
+        self._done = names.formation_done(place.robot, place.formation, listeners=parameters.done_listeners)
+        self._base = place.frame(names.BASE_FRAME)
+
+    def inputs(self) -> list[Input]:
+        """See `Component`."""
+        return [
+            Input(self._neighbour, self._on_neighbour_done),
+            Input(names.PREDICTION, self._on_prediction),
+            Input(names.BLOCKS, self._on_blocks),
+            Input(names.MOVED, self._on_moved),
+        ]
+
+    def outputs(self) -> list[names.Topic]:
+        """See `Component`."""
+        return [names.MOVE, names.camera_request(), names.DISPLACEMENT, names.RESIDUAL, names.ALIGNMENT, self._done]
+
+    def details(self) -> dict[str, str]:
+        """See `Component`."""
+        return {"timestep": str(self._tuner.timestep), "waiting for": self._tuner.phase.name.lower()}
+
+    def _on_neighbour_done(self, message: Any) -> None:
+        self._act(self._tuner.neighbour_done(int(message.data)))
+
+    def _on_prediction(self, message: Any) -> None:
+        self._act(self._tuner.prediction(conversions.read_displacement(message)))
+
+    def _on_moved(self, message: Any) -> None:
+        self._act(self._tuner.moved(conversions.read_displacement(message), conversions.stamp_of(message)))
+
+    def _on_blocks(self, message: Any) -> None:
+        try:
+            blocks = conversions.read_blocks(message)
+        except conversions.MessageError as error:
+            self.warn(str(error))
+            return
+        self._act(self._tuner.frame(blocks, conversions.stamp_of(message)))
+
+    def _act(self, actions: Sequence[core.Action]) -> None:
+        self.stamp_ns = self._tuner.stamp_ns
+        for action in actions:
+            match action:
+                case core.SendMove(motion):
+                    self._send(names.MOVE, conversions.move(motion, self._base, self.stamp_ns))
+                case core.RequestFrames(count):
+                    self._send(names.camera_request(), conversions.uint32(count))
+                case core.Report(displacement, residual):
+                    self._report(displacement, residual)
+                case core.Done(timestep):
+                    self._send(self._done, conversions.uint32(timestep))
+                case core.State(text):
+                    self._send(names.ALIGNMENT, conversions.string(text))
+                case core.Warn(text):
+                    self.warn(text)
+                case core.Lost():
+                    self.finish(LOST_EXIT_CODE, f"{self.place.robot} lost its beacon neighbour in timestep {self._tuner.timestep}")
+
+    def _report(self, displacement: Motion, residual: Motion | None) -> None:
+        self._send(names.DISPLACEMENT, conversions.displacement(displacement, self._base, self.stamp_ns))
+        known = residual is not None
+        message = conversions.displacement(
+            residual or Motion(), self._base, self.stamp_ns, (0.0,) * 4 if known else conversions.NO_ESTIMATE
+        )
+        self._send(names.RESIDUAL, message)

@@ -1,0 +1,77 @@
+"""Predictor: learns from the follower's own displacements how far it must move in the next timestep."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from robot_formation import conversions, names
+from robot_formation.components.base import Component, Input, Place
+from robot_formation.control.motion import Motion
+from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
+
+# (u, v) to (x, y) = (v, -u): how a covariance of the paper's axes becomes one of REP-103.
+_TO_XY = np.array([[0.0, 1.0], [-1.0, 0.0]])
+
+
+class PredictorComponent(Component):
+    """Answers each pair of `displacement` and `residual` with a `prediction`."""
+
+    def __init__(self, parameters: PredictorParameters, place: Place) -> None:
+        super().__init__(place)
+        self._predictor = Predictor(parameters)
+        self._displacements: dict[int, Any] = {}
+        self._residuals: dict[int, Any] = {}
+
+    def inputs(self) -> list[Input]:
+        """See `Component`."""
+        return [Input(names.DISPLACEMENT, self._on_displacement), Input(names.RESIDUAL, self._on_residual)]
+
+    def outputs(self) -> list[names.Topic]:
+        """See `Component`."""
+        return [names.PREDICTION]
+
+    def details(self) -> dict[str, str]:
+        """See `Component`."""
+        insight = self._predictor.insight()
+        values = {"predictor": self._predictor.name, "timesteps": str(self._predictor.observations)}
+        for name, array in (("K", insight.k), ("eigenvalues", insight.eigenvalues), ("innovation [m]", insight.innovation)):
+            if array is not None:
+                values[name] = np.array2string(array, precision=6, separator=", ").replace("\n", "")
+        if insight.condition_number is not None:
+            values["condition number"] = f"{insight.condition_number:.4g}"
+        return values
+
+    def _on_displacement(self, message: Any) -> None:
+        self._displacements[conversions.stamp_of(message)] = message
+        self._answer(conversions.stamp_of(message))
+
+    def _on_residual(self, message: Any) -> None:
+        self._residuals[conversions.stamp_of(message)] = message
+        self._answer(conversions.stamp_of(message))
+
+    def _answer(self, stamp_ns: int) -> None:
+        """Predict once both halves of the pair are here, whichever came first."""
+        if stamp_ns not in self._displacements or stamp_ns not in self._residuals:
+            return
+        motion = conversions.read_displacement(self._displacements.pop(stamp_ns))
+        self._residuals.pop(stamp_ns)  # the predictors of the paper don't use it
+        self.stamp_ns = stamp_ns
+        try:
+            self._predictor.observe(motion.u_m, motion.v_m)
+        except PredictionError as error:
+            self.warn(str(error))
+        try:
+            forecast = self._predictor.predict()
+        except PredictionError as error:
+            self.warn(f"{error}; answering with no motion")
+            self._send_prediction(Motion(), conversions.NO_ESTIMATE)
+            return
+        covariance = _TO_XY @ forecast.covariance @ _TO_XY.T
+        u_m, v_m = forecast.mean.tolist()
+        self._send_prediction(Motion.from_uv(u_m, v_m), covariance.ravel().tolist())
+
+    def _send_prediction(self, mean: Motion, covariance: Any) -> None:
+        base = self.place.frame(names.BASE_FRAME)
+        self._send(names.PREDICTION, conversions.displacement(mean, base, self.stamp_ns, covariance))

@@ -1,0 +1,197 @@
+"""World: stands in for the robots and their cameras; the only source of simulated time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation import conversions, names
+from robot_formation.components.base import Component, Input, Place
+from robot_formation.parameters import ParameterError, parameter
+from robot_formation.surface import Surface, make_surface
+from robot_formation.world.events import Event, Frame, JointStates, RobotPose
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.world import RobotStart, World
+
+_MESH_CELLS = 40
+
+
+@dataclass(frozen=True)
+class WorldNodeParameters(WorldParameters):
+    """The world's parameters, its surface, its robots and where they start."""
+
+    seed: int = parameter(0, "Seed of every random stream", low=0, high=2**63 - 1)
+    surface: str = parameter("bowl", "Name of the surface")
+    surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
+    robots: tuple[str, ...] = parameter(("leader", "follower_1"), "Names of the robots; followers carry a camera")
+    start_x_m: tuple[float, ...] = parameter((0.76, 1.08), "Start of each robot's base_link in the world", unit="m")
+    start_y_m: tuple[float, ...] = parameter((0.16, 0.16), "Start of each robot's base_link in the world", unit="m")
+    start_heading_rad: tuple[float, ...] = parameter((1.5707963, 1.5707963), "Start headings", unit="rad")
+    real_time_factor: float = parameter(
+        0.0, "Simulated seconds per wall second; 0 is as fast as possible", low=0.0, high=1000.0
+    )
+
+    def __post_init__(self) -> None:
+        """Check that every robot has a start."""
+        super().__post_init__()
+        lengths = {len(self.start_x_m), len(self.start_y_m), len(self.start_heading_rad), len(self.robots)}
+        if len(lengths) != 1 or len(set(self.robots)) != len(self.robots):
+            raise ParameterError("world: 'robots' must differ and have one start_x_m, start_y_m and start_heading_rad each")
+
+    def starts(self) -> list[RobotStart]:
+        """List the robots with their start poses."""
+        poses = zip(self.robots, self.start_x_m, self.start_y_m, self.start_heading_rad, strict=True)
+        return [RobotStart(name, x, y, heading, camera=name != names.LEADER) for name, x, y, heading in poses]
+
+    def make_surface(self) -> Surface:
+        """Build the surface that the parameters name."""
+        return make_surface(self.surface, surface_values(self.surface_parameters))
+
+
+def surface_values(texts: tuple[str, ...]) -> Mapping[str, float]:
+    """Read 'name=value' texts.
+
+    Raises:
+        ParameterError: if a text is no name and number.
+    """
+    values = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            values[name] = float(value)
+        except ValueError:
+            raise ParameterError(f"world: 'surface_parameters' must hold texts like 'height_m=0.1', not {text!r}") from None
+    return values
+
+
+class WorldComponent(Component):
+    """Moves robots on `<robot>/joint_commands`, takes pictures on `<robot>/camera/request`, publishes what happens."""
+
+    def __init__(self, parameters: WorldNodeParameters, place: Place) -> None:
+        super().__init__(place)
+        self._surface = parameters.make_surface()
+        self._parameters = parameters
+        self._world = World(self._surface, parameters.starts(), parameters, seed=parameters.seed)
+        self._cameras = [start.name for start in parameters.starts() if start.camera]
+        self._paths: dict[str, list[Any]] = {name: [] for name in parameters.robots}
+        # Topics are made once: a run sends thousands of messages.
+        self._joint_states = {name: names.joint_states(name) for name in parameters.robots}
+        self._images = {name: names.camera_image(name) for name in self._cameras}
+        self._odom = {name: names.ground_truth_odom(name) for name in parameters.robots}
+
+    def inputs(self) -> list[Input]:
+        """See `Component`."""
+        commands = [Input(names.joint_commands(name), partial(self._on_command, name)) for name in self._parameters.robots]
+        requests = [Input(names.camera_request(name), partial(self._on_request, name)) for name in self._cameras]
+        return commands + requests
+
+    def outputs(self) -> list[names.Topic]:
+        """See `Component`."""
+        topics = [names.CLOCK_TOPIC, names.SURFACE]
+        for name in self._parameters.robots:
+            topics += [self._joint_states[name], self._odom[name], names.ground_truth_pose(name), names.ground_truth_path(name)]
+        for name in self._cameras:
+            topics += [self._images[name], names.camera_info(name)]
+        return topics
+
+    def start(self) -> None:
+        """See `Component`: publishes what stands still, and every robot's start."""
+        vertices, colours, triangles = surface_mesh(self._surface)
+        self._send(names.SURFACE, conversions.surface_marker(vertices, colours, triangles, names.WORLD_FRAME))
+        camera = self._parameters.camera
+        for name in self._cameras:
+            info = conversions.camera_info(
+                camera.width_px,
+                camera.height_px,
+                camera.focal_length_px,
+                (camera.centre_x_px, camera.centre_y_px),
+                f"{name}/{names.OPTICAL_FRAME}",
+                0,
+            )
+            self._send(names.camera_info(name), info)
+        self._send(names.CLOCK_TOPIC, conversions.clock(0))
+        for name in self._parameters.robots:
+            self._publish(RobotPose(name, 0, self._world.ground_truth(name), final=True))
+
+    @property
+    def busy(self) -> bool:
+        """See `Component`."""
+        return self._world.owes
+
+    def work(self) -> None:
+        """See `Component`: advances to the next instant that has something to publish."""
+        events = self._world.advance()
+        self.stamp_ns = self._world.stamp_ns
+        self._send(names.CLOCK_TOPIC, conversions.clock(self.stamp_ns))
+        for event in events:
+            self._publish(event)
+
+    def details(self) -> dict[str, str]:
+        """See `Component`."""
+        return {"simulated time [s]": f"{self._world.stamp_ns / 1e9:.3f}", "owes": str(self._world.owes)}
+
+    def _on_command(self, robot: str, message: Any) -> None:
+        try:
+            command = conversions.read_joint_command(message)
+            self._world.command(robot, command.angles_rad, command.limits_rad_s)
+        except ValueError as error:
+            self.warn(f"{robot}: {error}; nothing moves")
+
+    def _on_request(self, robot: str, message: Any) -> None:
+        try:
+            self._world.request_frames(robot, int(message.data))
+        except ValueError as error:
+            self.warn(f"{robot}: {error}")
+
+    def _publish(self, event: Event) -> None:
+        match event:
+            case JointStates():
+                if event.timed_out:
+                    self.warn(f"{event.robot}: a motion took too long and was braked; is the robot blocked?")
+                message = conversions.joint_states(event.names, event.positions, event.velocities, event.stamp_ns)
+                self._send(self._joint_states[event.robot], message)
+            case Frame():
+                frame = f"{event.robot}/{names.OPTICAL_FRAME}"
+                self._send(self._images[event.robot], conversions.image(event.image, frame, event.stamp_ns))
+            case RobotPose():
+                self._publish_truth(event)
+
+    def _publish_truth(self, event: RobotPose) -> None:
+        robot, state = event.robot, event.state
+        to_world = state.pose.matrix()
+        odometry = conversions.body_odometry(
+            state.pose.position,
+            state.pose.orientation,
+            to_world.T @ np.array(state.linear_m_s),
+            to_world.T @ np.array(state.angular_rad_s),
+            frame=names.WORLD_FRAME,
+            child=f"{robot}/{names.BASE_FRAME}",
+            stamp_ns=event.stamp_ns,
+        )
+        self._send(self._odom[robot], odometry)
+        if event.final:
+            pose = conversions.pose_of(odometry)
+            self._paths[robot].append(pose)
+            self._send(names.ground_truth_pose(robot), pose)
+            path = conversions.path(self._paths[robot], names.WORLD_FRAME, event.stamp_ns)
+            self._send(names.ground_truth_path(robot), path)
+
+
+def surface_mesh(surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Triangulate the plate: vertices (n, 3) [m], colours (n, 3) by height, triangles (m, 3)."""
+    ticks = np.linspace(0.0, surface.size_m, _MESH_CELLS + 1)
+    xs, ys = np.meshgrid(ticks, ticks)
+    zs = surface.heights(xs, ys)
+    vertices = np.column_stack([xs.ravel(), ys.ravel(), zs.ravel()])
+    spread = float(np.ptp(zs))
+    shade = (zs.ravel() - zs.min()) / spread if spread > 0.0 else np.zeros(zs.size)
+    colours = np.column_stack([0.25 + 0.45 * shade, 0.45 + 0.35 * shade, 0.35 + 0.2 * shade])
+    corner = (np.arange(_MESH_CELLS)[:, None] * (_MESH_CELLS + 1) + np.arange(_MESH_CELLS)).ravel()
+    right, up = corner + 1, corner + _MESH_CELLS + 1
+    triangles = np.concatenate([np.column_stack([corner, right, up + 1]), np.column_stack([corner, up + 1, up])])
+    return vertices, colours, triangles

@@ -1,0 +1,130 @@
+"""A whole run in one process: the node graph's components on a queue, without a middleware.
+
+The components, the messages and their order per topic are those of the node graph, so the run is the same to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from robot_formation import conversions
+from robot_formation.bag.qos import TopicQos
+from robot_formation.bag.recorder import Recorder
+from robot_formation.components.base import Component, Handler, Place
+from robot_formation.components.catalogue import KINDS, NodeKind
+from robot_formation.experiment.run_result import LOST_EXIT_CODE, RunError
+from robot_formation.experiment.scenario import Scenario
+from robot_formation.names import Topic
+from robot_formation.parameters import from_mapping
+
+IMAGE_TYPE = "sensor_msgs/msg/Image"
+
+
+@dataclass
+class _Hosted:
+    component: Component
+    namespace: str
+
+
+@dataclass
+class InProcessRun:
+    """Builds the components of a scenario and runs them to the end.
+
+    Args:
+        scenario: what to run.
+        recorder: where the messages go, if anywhere.
+        images: whether pictures are recorded too.
+        listen: called with every absolute topic name and message, before the components get it.
+    """
+
+    scenario: Scenario
+    recorder: Recorder | None = None
+    images: bool = False
+    listen: Callable[[str, Any], None] | None = None
+    warnings: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._queue: deque[tuple[str, Topic, Any]] = deque()
+        self._handlers: dict[str, list[Handler]] = {}
+        self._hosted = [self._host(kind, robot) for kind in KINDS.values() for robot in kind.robots_of(self.scenario.setup.followers)]
+        for hosted in self._hosted:
+            for entry in hosted.component.inputs():
+                name = absolute(hosted.namespace, entry.topic.name)
+                self._handlers.setdefault(name, []).append(entry.handler)
+
+    def run(self) -> int:
+        """Run until a component ends; return its exit code (0 done, 3 lost).
+
+        Raises:
+            RunError: if everybody waits for somebody, which no run should come to.
+        """
+        for hosted in self._hosted:
+            hosted.component.start()
+        world = self._hosted[0].component
+        while True:
+            self._deliver()
+            codes = [h.component.exit_code for h in self._hosted if h.component.exit_code is not None]
+            if codes:
+                return max(codes)
+            if not world.busy:
+                states = ", ".join(f"{h.namespace}: {dict(h.component.health().values)}" for h in self._hosted)
+                raise RunError(f"the run stands still: everybody waits ({states})")
+            world.work()
+
+    def _host(self, kind: NodeKind, robot: str) -> _Hosted:
+        parameters = from_mapping(
+            kind.parameter_class(), self.scenario.robot_parameters(kind.name, robot), where=f"{robot}/{kind.name}"
+        )
+        component: Component = kind.component_class()(parameters, Place(robot))
+        namespace = f"/{robot}" if robot else ""
+        component.attach(partial(self._send, namespace), partial(self._say, f"{namespace}/{kind.name}"))
+        return _Hosted(component, namespace)
+
+    def _send(self, namespace: str, topic: Topic, message: Any) -> None:
+        self._queue.append((absolute(namespace, topic.name), topic, message))
+
+    def _say(self, node: str, level: int, text: str) -> None:
+        if level > 0:
+            self.warnings.append(f"{node}: {text}")
+
+    def _deliver(self) -> None:
+        queue = self._queue
+        while queue:
+            name, topic, message = queue.popleft()
+            if self.recorder is not None and (self.images or topic.type != IMAGE_TYPE):
+                self._record(self.recorder, name, topic, message)
+            if self.listen is not None:
+                self.listen(name, message)
+            for handler in self._handlers.get(name, ()):
+                handler(message)
+
+    def _record(self, recorder: Recorder, name: str, topic: Topic, message: Any) -> None:
+        if name not in recorder.topics:
+            qos = topic.qos
+            recorder.add_topic(name, topic.type, TopicQos(qos.history, qos.depth, qos.reliability, qos.durability))
+        recorder.record(name, topic.type, conversions.to_cdr(message))
+
+
+def absolute(namespace: str, name: str) -> str:
+    """Resolve a topic name as ROS does: absolute ones stay, relative ones lie in the namespace."""
+    return name if name.startswith("/") else f"{namespace}/{name}"
+
+
+def run_in_process(scenario: Scenario, bag: Path | None, metadata: dict[str, str], *, images: bool = False) -> tuple[int, list[str]]:
+    """Run a scenario and record it if a path is given; return the exit code and the warnings."""
+    recorder = Recorder(bag, metadata) if bag is not None else None
+    try:
+        run = InProcessRun(scenario, recorder, images)
+        code = run.run()
+    finally:
+        if recorder is not None:
+            recorder.close()
+    return code, run.warnings
+
+
+__all__ = ["LOST_EXIT_CODE", "InProcessRun", "absolute", "run_in_process"]

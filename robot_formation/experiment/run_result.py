@@ -1,0 +1,38 @@
+"""How a run ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from robot_formation.errors import FormationError
+
+DONE_EXIT_CODE = 0
+LOST_EXIT_CODE = 3
+NODE_DIED_EXIT_CODE = 4
+INTERRUPTED_EXIT_CODE = 130
+
+
+class RunError(FormationError):
+    """A run can't go on."""
+
+
+@dataclass
+class NodeUsage:
+    """What a node cost: processor seconds and peak resident memory."""
+
+    processor_s: float
+    peak_memory_mb: float
+
+
+@dataclass
+class RunResult:
+    """Exit code (0 done, 3 lost, 4 a node died, 130 interrupted), the reason if there is one, the bag and the costs."""
+
+    exit_code: int
+    bag: Path | None = None
+    reason: str = ""
+    warnings: list[str] = field(default_factory=list)
+    startup_s: float = 0.0
+    running_s: float = 0.0
+    usage: dict[str, NodeUsage] = field(default_factory=dict)

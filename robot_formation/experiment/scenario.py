@@ -1,0 +1,219 @@
+"""A scenario: everything that a run needs to be repeated, from YAML presets, files and `--set KEY=VALUE`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from robot_formation import names
+from robot_formation.components.catalogue import KINDS
+from robot_formation.errors import FormationError
+from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
+from robot_formation.paths import config_dir
+from robot_formation.surface import SURFACES, make_surface
+
+FORMATION_DISTANCE_M = 0.32
+
+
+class ScenarioError(FormationError):
+    """A scenario, a preset or an override can't be used."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a scenario says beside the nodes' parameters."""
+
+    name: str = parameter("", "Name shown in reports")
+    seed: int = parameter(0, "Seed of every random stream", low=0, high=2**63 - 1)
+    followers: int = parameter(1, "Number of followers, each beside the one before", low=1, high=9)
+    start_x_m: float = parameter(0.763, "Start of the leader", unit="m", low=-10.0, high=100.0)
+    start_y_m: float = parameter(0.158, "Start of the leader", unit="m", low=-10.0, high=100.0)
+    heading_deg: float = parameter(90.0, "Heading of the formation", unit="deg", low=-360.0, high=360.0)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A setup and the parameters that differ from config/, flat, by node kind."""
+
+    setup: Setup
+    sections: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def robots(self) -> list[str]:
+        """Names of the robots, the leader first."""
+        return [names.LEADER, *(names.follower(n) for n in range(1, self.setup.followers + 1))]
+
+    def parameters(self, kind: str) -> dict[str, Any]:
+        """Collect a node's parameters: config/, then the scenario's, then what the setup fixes; flat and checked.
+
+        Raises:
+            ParameterError: on an unknown name, a wrong type or a value out of range.
+        """
+        values = {**node_defaults(kind), **self.sections.get(kind, {})}
+        if kind == "world":
+            values.update(self._world())
+        elif kind == "leader":
+            values["followers"] = self.robots[1:]
+        checked = from_mapping(KINDS[kind].parameter_class(), values, where=kind)
+        return to_mapping(checked)
+
+    def robot_parameters(self, kind: str, robot: str) -> dict[str, Any]:
+        """Collect the parameters of one robot's node."""
+        values = self.parameters(kind)
+        if kind == "fine_tuner":
+            # The leader hears every follower, a follower the one on its left.
+            values["done_listeners"] = 1 if robot == self.robots[-1] else 2
+        return values
+
+    def check(self) -> None:
+        """Check every node's parameters and the surface's.
+
+        Raises:
+            FormationError: naming what is wrong.
+        """
+        for kind in KINDS:
+            self.parameters(kind)
+        from robot_formation.components.world import surface_values
+
+        world = self.parameters("world")
+        make_surface(world["surface"], surface_values(tuple(world["surface_parameters"])))
+
+    def _world(self) -> dict[str, Any]:
+        heading = math.radians(self.setup.heading_deg)
+        right = (math.sin(heading), -math.cos(heading))
+        places = [FORMATION_DISTANCE_M * n for n in range(len(self.robots))]
+        return {
+            "seed": self.setup.seed,
+            "robots": self.robots,
+            "start_x_m": [self.setup.start_x_m + d * right[0] for d in places],
+            "start_y_m": [self.setup.start_y_m + d * right[1] for d in places],
+            "start_heading_rad": [heading] * len(self.robots),
+        }
+
+
+def presets() -> dict[str, Path]:
+    """List the scenarios in config/scenarios by name; tracks are called track_NAME."""
+    return {path.stem: path for path in sorted((config_dir() / "scenarios").glob("*.yaml"))}
+
+
+def track_names() -> list[str]:
+    """List what --track takes."""
+    return [name.removeprefix("track_") for name in presets() if name.startswith("track_")]
+
+
+def load_track(track: str) -> Scenario:
+    """Load a preset track by its short name.
+
+    Raises:
+        ScenarioError: if there is none of this name.
+    """
+    if track not in track_names():
+        raise ScenarioError(f"no track '{track}'{suggestion(track, track_names())}")
+    return load(presets()[f"track_{track}"])
+
+
+def load(path: Path) -> Scenario:
+    """Read a scenario file.
+
+    Raises:
+        ScenarioError: if it can't be read or isn't a mapping.
+        ParameterError: on unknown or wrong entries.
+    """
+    content = read_yaml(path)
+    if not isinstance(content, Mapping):
+        raise ScenarioError(f"{path}: a scenario is a mapping with entries like 'seed' and 'leader'; see config/scenarios")
+    known = [*specs(Setup), *KINDS]
+    for key in content:
+        if key not in known:
+            raise ParameterError(f"{path}: no entry '{key}'{suggestion(str(key), known)}")
+    top = {key: value for key, value in content.items() if key not in KINDS}
+    setup = from_mapping(Setup, {"name": path.stem, **top}, where=str(path))
+    sections = {}
+    for kind in KINDS:
+        section = content.get(kind) or {}
+        if not isinstance(section, Mapping):
+            raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {section!r}")
+        sections[kind] = _checked(kind, flatten(section), where=f"{path}: {kind}")
+    return Scenario(setup, sections)
+
+
+def _checked(kind: str, section: Mapping[str, Any], *, where: str) -> dict[str, Any]:
+    checked = to_mapping(from_mapping(KINDS[kind].parameter_class(), {**node_defaults(kind), **section}, where=where))
+    return {name: checked[name] for name in section}
+
+
+def override(scenario: Scenario, settings: Sequence[str]) -> Scenario:
+    """Apply settings like 'predictor.forgetting=0.95' or 'seed=3'; the value is read as YAML.
+
+    Raises:
+        ScenarioError: if a setting has no '=' or names no node.
+        ParameterError: on an unknown parameter or a wrong value.
+    """
+    for setting in settings:
+        key, equals, text = setting.partition("=")
+        if not equals:
+            raise ScenarioError(f"--set takes KEY=VALUE, like predictor.forgetting=0.95, not '{setting}'")
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError:
+            raise ScenarioError(f"--set {key}: '{text}' is no YAML value") from None
+        scenario = with_value(scenario, key, value)
+    return scenario
+
+
+def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
+    """Set one value: 'seed' or 'NODE.PARAMETER'."""
+    kind, dot, name = key.partition(".")
+    if not dot:
+        if key not in specs(Setup):
+            raise ParameterError(f"--set: no entry '{key}'{suggestion(key, [*specs(Setup), *(f'{k}.' for k in KINDS)])}")
+        values = {**to_mapping(scenario.setup), key: value}
+        return replace(scenario, setup=from_mapping(Setup, values, where="--set"))
+    if kind not in KINDS:
+        raise ParameterError(f"--set: no node '{kind}'{suggestion(kind, KINDS)}")
+    section = {**scenario.sections.get(kind, {}), **_checked(kind, {name: value}, where=f"--set: {kind}")}
+    return replace(scenario, sections={**scenario.sections, kind: section})
+
+
+def with_surface(scenario: Scenario, surface: str) -> Scenario:
+    """Put the scenario on another surface with that surface's own defaults."""
+    if surface not in SURFACES:
+        raise ParameterError(f"no surface '{surface}'{suggestion(surface, SURFACES)}")
+    scenario = with_value(scenario, "world.surface", surface)
+    return with_value(scenario, "world.surface_parameters", [])
+
+
+def node_defaults(kind: str) -> dict[str, Any]:
+    """Read config/NODE.yaml: the parameters of a node in ROS's own file format, flat.
+
+    Raises:
+        ScenarioError: if the file has not the form of a ROS parameter file.
+    """
+    path = config_dir() / f"{kind}.yaml"
+    content = read_yaml(path)
+    try:
+        values = content["/**"]["ros__parameters"]
+        return flatten(values)
+    except (KeyError, TypeError, AttributeError):
+        raise ScenarioError(f"{path}: a ROS parameter file begins with '/**:' and 'ros__parameters:'") from None
+
+
+def read_yaml(path: Path) -> Any:
+    """Read a YAML file safely.
+
+    Raises:
+        ScenarioError: if it is missing, unreadable or no YAML.
+    """
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: can't read it: {getattr(error, 'strerror', None) or error}") from None
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f" in line {mark.line + 1}" if mark else ""
+        raise ScenarioError(f"{path}: no valid YAML{where}: {getattr(error, 'problem', None) or error}") from None

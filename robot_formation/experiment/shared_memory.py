@@ -1,0 +1,118 @@
+"""Removes what killed ROS processes leave in shared memory.
+
+Fast DDS gives a process segments (`fastrtps_<16 hex digits>`) and ports (`fastrtps_port<N>` with a semaphore
+`sem.fastrtps_port<N>_mutex`). Beside each lies a file ending in `_el` (`_sl` where several share a port) that its owner
+keeps locked (flock), and the kernel opens that lock when the owner dies, however that happens. A process that ends in
+good order removes its files itself.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import re
+from pathlib import Path
+
+from robot_formation.experiment.domain import FIRST_PORT, domain_ports
+
+SHARED_MEMORY = Path("/dev/shm")
+
+_NAME = re.compile(r"(?:sem\.)?(?P<group>fastrtps_(?:[0-9a-f]{16}|port(?P<port>\d+)))(?P<part>_el|_sl|_mutex)?")
+
+
+def fast_dds_files(folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
+    """List Fast DDS' files by the segment or port that they belong to; empty where the folder can't be read."""
+    groups: dict[str, list[str]] = {}
+    with contextlib.suppress(OSError):
+        for name in sorted(os.listdir(folder)):
+            match = _NAME.fullmatch(name)
+            if match:
+                groups.setdefault(match["group"], []).append(name)
+    return groups
+
+
+def find_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
+    """List the groups of files whose owners are all dead; removes nothing. Arguments as for clean_orphans."""
+    groups = {group: names for group, names in fast_dds_files(folder).items() if _belongs(group, domain)}
+    orphans = {}
+    for group, names in groups.items():
+        held = _lock_all(folder, names)
+        if held:
+            orphans[group] = names
+            _unlock(held)
+    return orphans
+
+
+def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> list[str]:
+    """Remove the files whose owners are dead, and never a living process' files.
+
+    Args:
+        domain: Leave the ports of other domains alone. Segments, and the ports below 7400, carry no domain in their
+            name and are removed in any case. None: every domain.
+        folder: Where shared memory lies.
+
+    Returns:
+        The names of the removed files. Files that this user may not remove are passed over.
+    """
+    removed: list[str] = []
+    candidates = find_orphans(domain, folder)
+    if not candidates:
+        return removed
+    in_use = _opened_files(folder)
+    for names in candidates.values():
+        # A starting process opens its lock file just before it locks it: whatever somebody has open is not dead.
+        if in_use.intersection(names):
+            continue
+        held = _lock_all(folder, names)  # kept while removing, so that no new process takes the files over meanwhile
+        if not held:
+            continue
+        for name in names:
+            with contextlib.suppress(OSError):
+                (folder / name).unlink()
+                removed.append(name)
+        _unlock(held)
+    return removed
+
+
+def _belongs(group: str, domain: int | None) -> bool:
+    """Tell whether a group may be removed when cleaning up after this domain."""
+    match = _NAME.fullmatch(group)
+    if domain is None or match is None or match["port"] is None:
+        return True
+    port = int(match["port"])
+    return port < FIRST_PORT or port in domain_ports(domain)
+
+
+def _lock_all(folder: Path, names: list[str]) -> list[int]:
+    """Lock a group's lock files; returns their descriptors, none if an owner lives or nothing tells about the owner."""
+    held: list[int] = []
+    for name in names:
+        if not name.endswith(("_el", "_sl")):
+            continue
+        try:
+            held.append(os.open(folder / name, os.O_RDONLY | os.O_CLOEXEC))
+            fcntl.flock(held[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            _unlock(held)
+            return []
+    return held
+
+
+def _unlock(descriptors: list[int]) -> None:
+    for descriptor in descriptors:
+        os.close(descriptor)
+
+
+def _opened_files(folder: Path) -> set[str]:
+    """List the lock files that any process has open, as far as this user can see."""
+    prefix = f"{folder}/fastrtps_"
+    found: set[str] = set()
+    for process in Path("/proc").glob("[0-9]*/fd"):
+        with contextlib.suppress(OSError):
+            for descriptor in os.listdir(process):
+                with contextlib.suppress(OSError):
+                    target = os.readlink(process / descriptor)
+                    if target.startswith(prefix) and target.endswith(("_el", "_sl")):
+                        found.add(os.path.basename(target))
+    return found

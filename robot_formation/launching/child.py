@@ -1,0 +1,93 @@
+"""One node's process: started apart from the terminal, watched, and ended in good order."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import yaml
+
+from robot_formation.experiment.run_result import NodeUsage
+from robot_formation.launching.processes import Process
+
+_PR_SET_PDEATHSIG = 1
+_LOG_LINE = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[\d.]+\] \[(?P<node>[^\]]+)\]: (?P<text>.*)")
+
+
+def _die_with_parent() -> None:
+    """Ask Linux to end this process in good order when its launcher dies, however that happens."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+class Child:
+    """Starts a process of the table with its parameters in a file; output goes to a log in `folder`."""
+
+    def __init__(self, process: Process, folder: Path, environment: Mapping[str, str]) -> None:
+        self.process = process
+        stem = process.name.strip("/").replace("/", "_")
+        self._log = folder / f"{stem}.log"
+        parameters = folder / f"{stem}.yaml"
+        content = {"/**": {"ros__parameters": process.ros_parameters()}}
+        parameters.write_text(yaml.safe_dump(content), encoding="utf-8")
+        command = [sys.executable, "-m", f"robot_formation.nodes.{process.executable}", "--ros-args"]
+        command += ["-r", f"__ns:={process.namespace}", "--params-file", str(parameters)]
+        with self._log.open("wb") as log:
+            self._popen = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                env=dict(environment),
+                # Ctrl-C in the terminal is for the launcher, which ends the nodes in order.
+                start_new_session=True,
+                preexec_fn=_die_with_parent,
+            )
+        self.exit_code: int | None = None
+        self.usage: NodeUsage | None = None
+
+    @property
+    def name(self) -> str:
+        """The node's full name."""
+        return self.process.name
+
+    def poll(self) -> int | None:
+        """Return the exit code (negative: the signal that killed it), None while it runs."""
+        if self.exit_code is None:
+            pid, status, used = os.wait4(self._popen.pid, os.WNOHANG)
+            if pid:
+                self.exit_code = self._popen.returncode = os.waitstatus_to_exitcode(status)
+                self.usage = NodeUsage(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0)
+        return self.exit_code
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal if the process still runs."""
+        if self.poll() is None:
+            os.kill(self._popen.pid, number)
+
+    @property
+    def death(self) -> str:
+        """Say how it ended."""
+        code = self.exit_code or 0
+        how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        last = self.last_words()
+        return f"{how}: {last}" if last else how
+
+    def last_words(self) -> str:
+        """Return the last line of its output."""
+        lines = self._text().strip().splitlines()
+        match = _LOG_LINE.match(lines[-1]) if lines else None
+        return (match["text"] if match else lines[-1].strip()) if lines else ""
+
+    def warnings(self) -> list[str]:
+        """List what it warned of."""
+        matches = (_LOG_LINE.match(line) for line in self._text().splitlines())
+        return [f"{self.name}: {match['text']}" for match in matches if match]
+
+    def _text(self) -> str:
+        return self._log.read_text(encoding="utf-8", errors="replace")

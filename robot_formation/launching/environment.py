@@ -1,0 +1,29 @@
+"""What a node's process needs of its environment, with ROS from pip or from an install."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+
+def node_environment(domain: int, log_folder: Path) -> dict[str, str]:
+    """Make a process's environment: its own ROS domain on this machine only, and logs that are ours to remove.
+
+    With ROS from pip also AMENT_PREFIX_PATH, which the wheels don't set, is given; LD_LIBRARY_PATH is inherited from this
+    process, where the wheels' start-up hook has set it.
+    """
+    environment = dict(os.environ)
+    environment.update(
+        ROS_DOMAIN_ID=str(domain),
+        ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST",
+        ROS_LOG_DIR=str(log_folder),
+        RCUTILS_LOGGING_USE_STDOUT="0",
+        PYTHONUNBUFFERED="1",
+    )
+    environment.pop("ROS_STATIC_PEERS", None)
+    environment.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+    # Many small processes on few cores: a pool of threads for linear algebra in each would only get in the way.
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        environment.setdefault(name, "1")
+    return environment

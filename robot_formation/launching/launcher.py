@@ -1,0 +1,182 @@
+"""Starts a run's nodes as processes of their own, watches them, and ends them in good order."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from robot_formation.bag.errors import BagError
+from robot_formation.bag.recover import recover
+from robot_formation.bag.writer import PARTIAL_SUFFIX
+from robot_formation.experiment.domain import DomainReservation
+from robot_formation.experiment.progress import Progress
+from robot_formation.experiment.run_result import (
+    DONE_EXIT_CODE,
+    INTERRUPTED_EXIT_CODE,
+    LOST_EXIT_CODE,
+    NODE_DIED_EXIT_CODE,
+    RunError,
+    RunResult,
+)
+from robot_formation.experiment.scenario import Scenario
+from robot_formation.experiment.shared_memory import clean_orphans
+from robot_formation.launching.child import Child
+from robot_formation.launching.environment import node_environment
+from robot_formation.launching.processes import RECORDER, processes
+
+_POLL_S = 0.05
+_BAD_INPUT_EXIT_CODE = 2
+# How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
+_STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
+_RECORDER_STOP_SIGNALS = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 1.0))
+
+
+@dataclass
+class Launcher:
+    """Runs a scenario through the node graph.
+
+    Args:
+        scenario: what to run.
+        bag: where the recorder writes; None records nothing.
+        images: whether pictures are recorded too.
+        say: takes the lines of progress.
+        silence_s: wall seconds without any sign of life after which the run is given up.
+        callback_delay_s: longest random delay before each callback of every node (tests).
+        on_start: called once all processes run, with the ROS domain and the process ids by node name (tests).
+    """
+
+    scenario: Scenario
+    bag: Path | None
+    images: bool = False
+    say: Callable[[str], None] = lambda text: None
+    silence_s: float = 90.0
+    callback_delay_s: float = 0.0
+    on_start: Callable[[int, dict[str, int]], None] | None = None
+    _children: list[Child] = field(default_factory=list, init=False)
+    _interrupted: int = field(default=0, init=False)
+
+    def run(self) -> RunResult:
+        """Run to the end; whatever happens, no process, file or shared memory is left but the bag.
+
+        Raises:
+            RunError: if the bag's path is taken or a node refuses its parameters.
+        """
+        self._check_bag()
+        with contextlib.ExitStack() as stack:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="robot_formation_")))
+            domain = stack.enter_context(DomainReservation())
+            stack.enter_context(self._signals())
+            stack.callback(clean_orphans, domain)
+            result = RunResult(NODE_DIED_EXIT_CODE, self.bag)
+            began = time.monotonic()
+            try:
+                self._start(folder, domain)
+                result.exit_code, result.reason = self._watch(domain, result, began)
+            finally:
+                self._stop()
+                result.running_s = time.monotonic() - began - result.startup_s
+                result.usage = {child.name: child.usage for child in self._children if child.usage}
+                result.warnings = [text for child in self._children for text in child.warnings()]
+                self._rescue_bag(result)
+        return result
+
+    def _check_bag(self) -> None:
+        if self.bag is None:
+            return
+        for path in (self.bag, self.bag.with_name(self.bag.name + PARTIAL_SUFFIX)):
+            if path.exists():
+                raise RunError(f"{path} exists already and is not overwritten; choose another path with --bag")
+
+    def _start(self, folder: Path, domain: int) -> None:
+        environment = node_environment(domain, folder)
+        for process in processes(self.scenario, self.bag, images=self.images):
+            if self.callback_delay_s and process.executable != RECORDER:
+                delay = {"callback_delay_s": self.callback_delay_s}
+                process = type(process)(process.executable, process.namespace, {**process.parameters, **delay})
+            self._children.append(Child(process, folder, environment))
+        if self.on_start is not None:
+            self.on_start(domain, {child.name: child._popen.pid for child in self._children})
+
+    def _watch(self, domain: int, result: RunResult, began: float) -> tuple[int, str]:
+        """Follow the run until something ends it; return the exit code and why."""
+        from robot_formation.nodes.monitor import Monitor  # here, since it needs the environment of the wheels
+
+        setup, timesteps = self.scenario.setup, self.scenario.parameters("leader")["timesteps"]
+        progress = Progress(setup.followers, timesteps, self.say, lambda: time.monotonic() - began)
+        last, heard = time.monotonic(), 0
+        with Monitor(domain, progress.topics, progress.listen) as monitor:
+            while True:
+                monitor.spin(_POLL_S)
+                now = time.monotonic()
+                if monitor.messages != heard:
+                    last, heard = now, monitor.messages
+                    result.startup_s = result.startup_s or now - began
+                if self._interrupted:
+                    return INTERRUPTED_EXIT_CODE, "interrupted"
+                ended = next((child for child in self._children if child.poll() is not None), None)
+                if ended is not None:
+                    monitor.spin(_POLL_S)
+                    return self._verdict(ended)
+                if now - last > self.silence_s:
+                    return NODE_DIED_EXIT_CODE, f"no node has shown a sign of life for {self.silence_s:.0f} s"
+
+    def _verdict(self, ended: Child) -> tuple[int, str]:
+        code, executable = ended.exit_code, ended.process.executable
+        if code == 0 and executable == "leader":
+            return DONE_EXIT_CODE, ""
+        if code == LOST_EXIT_CODE and executable == "fine_tuner":
+            return LOST_EXIT_CODE, ended.last_words()
+        if code == _BAD_INPUT_EXIT_CODE:
+            raise RunError(ended.last_words())
+        return NODE_DIED_EXIT_CODE, f"node {ended.name} {ended.death}"
+
+    def _stop(self) -> None:
+        """End all nodes, the recorder last, so that it gets everything that the others still send."""
+        recorders = [child for child in self._children if child.process.executable == RECORDER]
+        self._end([child for child in self._children if child not in recorders], _STOP_SIGNALS)
+        self._end(recorders, _RECORDER_STOP_SIGNALS)
+
+    def _end(self, children: list[Child], signals: tuple[tuple[signal.Signals, float], ...]) -> None:
+        for number, patience_s in signals:
+            end = time.monotonic() + patience_s
+            for child in children:
+                child.signal(number)
+            while any(child.poll() is None for child in children) and time.monotonic() < end:
+                time.sleep(0.01)
+
+    def _rescue_bag(self, result: RunResult) -> None:
+        """Finish a bag that its recorder could not finish."""
+        if self.bag is None or self.bag.exists():
+            return
+        partial = self.bag.with_name(self.bag.name + PARTIAL_SUFFIX)
+        if not partial.exists():
+            result.bag = None
+            return
+        try:
+            recover(partial, self.bag)
+        except BagError as error:
+            result.warnings.append(str(error))
+            result.bag = None
+
+    @contextlib.contextmanager
+    def _signals(self) -> Iterator[None]:
+        """Turn SIGINT and SIGTERM into a flag; the second one stops waiting for nodes in good order."""
+
+        def handler(number: int, frame: Any) -> None:
+            self._interrupted += 1
+            if self._interrupted > 1:
+                for child in self._children:
+                    child.signal(signal.SIGKILL)
+
+        before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, previous in before.items():
+                signal.signal(number, previous)

@@ -1,0 +1,81 @@
+"""The processes of a run, from one table: our own launcher and launch/formation.launch.py both start these."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata as package_metadata
+from pathlib import Path
+from typing import Any
+
+import robot_formation
+from robot_formation.components.catalogue import KINDS
+from robot_formation.experiment.scenario import Scenario
+
+RECORDER = "recorder"
+
+
+@dataclass(frozen=True)
+class Process:
+    """One node: executable, namespace, and its parameters by dotted name."""
+
+    executable: str
+    namespace: str
+    parameters: Mapping[str, Any]
+
+    @property
+    def name(self) -> str:
+        """The node's full name, for people."""
+        return f"{self.namespace.rstrip('/')}/{self.executable}"
+
+    def ros_parameters(self) -> dict[str, Any]:
+        """Give the parameters as a ROS parameter file holds them: empty lists are left out, ROS can't tell their type."""
+        return {name: value for name, value in self.parameters.items() if value != []}
+
+
+def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, patience_s: float = 60.0) -> list[Process]:
+    """List the processes of a run in the order of their start.
+
+    Args:
+        scenario: what to run.
+        bag: where the recorder writes; None for no recorder.
+        images: whether pictures are recorded too.
+        patience_s: how long a node waits for its listeners.
+    """
+    host = {"wait_for_listeners_s": patience_s, "recorder": RECORDER if bag else "", "record_images": images and bool(bag)}
+    found = []
+    if bag is not None:
+        parameters = {"path": str(bag), "images": images, "metadata": [f"{k}={v}" for k, v in run_metadata(scenario).items()]}
+        found.append(Process(RECORDER, "/", parameters))
+    for kind in KINDS.values():
+        for robot in kind.robots_of(scenario.setup.followers):
+            found.append(Process(kind.name, f"/{robot}", {**scenario.robot_parameters(kind.name, robot), **host}))
+    return found
+
+
+def run_metadata(scenario: Scenario) -> dict[str, str]:
+    """Describe a run for the bag's metadata record: scenario, seed, what ran with which parameters and versions."""
+    world, leader, predictor = (scenario.parameters(kind) for kind in ("world", "leader", "predictor"))
+    return {
+        "scenario": scenario.setup.name,
+        "seed": str(scenario.setup.seed),
+        "predictor": predictor["name"],
+        "surface": world["surface"],
+        "surface_parameters": json.dumps(dict(text.split("=", 1) for text in world["surface_parameters"])),
+        "timesteps": str(leader["timesteps"]),
+        "camera": world["camera.mode"],
+        "parameters": json.dumps({kind: scenario.parameters(kind) for kind in KINDS}, sort_keys=True),
+        "versions": json.dumps(_versions()),
+    }
+
+
+def _versions() -> dict[str, str]:
+    found = {"robot_formation": robot_formation.__version__, "python": platform.python_version()}
+    for package in ("numpy", "pybullet", "opencv-python-headless", "mcap"):
+        try:
+            found[package] = package_metadata.version(package)
+        except package_metadata.PackageNotFoundError:
+            found[package] = "not from pip"
+    return found

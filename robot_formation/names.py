@@ -1,0 +1,127 @@
+"""Every topic, frame and quality of service in one place.
+
+Names are relative: a robot's nodes run in the robot's namespace, the world and the recorder in the run's. What belongs to
+the formation as a whole lies under the namespace given by the parameter `formation` (default `/formation`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LEADER = "leader"
+FORMATION = "/formation"
+
+WORLD_FRAME = "world"
+BASE_FRAME = "base_link"
+ODOM_FRAME = "odom"
+OPTICAL_FRAME = "camera_optical_frame"
+
+
+@dataclass(frozen=True)
+class Qos:
+    """Quality of service by its ROS names; nothing inside a run may be dropped, hence reliable and keep_all."""
+
+    reliability: str = "reliable"
+    durability: str = "volatile"
+    history: str = "keep_all"
+    depth: int = 0
+
+
+EVENT = Qos()
+LATCHED = Qos(durability="transient_local", history="keep_last", depth=1)
+CLOCK = Qos(history="keep_last", depth=100)
+STATUS = Qos(history="keep_last", depth=10)
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic: name (relative or absolute), message type, QoS and how many listeners a publisher must wait for.
+
+    A message is held back until that many nodes have subscribed, so that the first ones are not lost to discovery.
+    """
+
+    name: str
+    type: str
+    qos: Qos = EVENT
+    listeners: int = 0
+
+
+def follower(number: int) -> str:
+    """Name the n-th follower, counted from 1."""
+    return f"follower_{number}"
+
+
+def beacon_neighbour(robot: str) -> str:
+    """Name the robot on a follower's left, which it keeps its place beside.
+
+    Raises:
+        ValueError: if the robot is no follower.
+    """
+    prefix, _, number = robot.partition("_")
+    if prefix != "follower" or not number.isdigit() or int(number) < 1:
+        raise ValueError(f"'{robot}' is no follower: followers are called follower_1, follower_2, ...")
+    return LEADER if number == "1" else follower(int(number) - 1)
+
+
+def under(prefix: str, name: str) -> str:
+    """Join a robot's name (may be empty: the node's own namespace) and a topic."""
+    return f"{prefix}/{name}" if prefix else name
+
+
+def joint_commands(robot: str = "") -> Topic:
+    """Relative wheel rotations for a robot (drive to world)."""
+    return Topic(under(robot, "joint_commands"), "sensor_msgs/msg/JointState", listeners=1)
+
+
+def joint_states(robot: str = "") -> Topic:
+    """Wheels and encoder wheels of a robot (world to drive)."""
+    return Topic(under(robot, "joint_states"), "sensor_msgs/msg/JointState", listeners=1)
+
+
+def camera_request(robot: str = "") -> Topic:
+    """Number of frames wanted (fine_tuner to world)."""
+    return Topic(under(robot, "camera/request"), "std_msgs/msg/UInt32", listeners=1)
+
+
+def camera_image(robot: str = "") -> Topic:
+    """A camera's picture (world to block_detector)."""
+    return Topic(under(robot, "camera/image_raw"), "sensor_msgs/msg/Image", listeners=1)
+
+
+def camera_info(robot: str = "") -> Topic:
+    """A camera's calibration."""
+    return Topic(under(robot, "camera/camera_info"), "sensor_msgs/msg/CameraInfo", LATCHED)
+
+
+def ground_truth_odom(robot: str) -> Topic:
+    """True pose and velocity of base_link in the world."""
+    return Topic(f"ground_truth/{robot}/odom", "nav_msgs/msg/Odometry")
+
+
+def ground_truth_pose(robot: str) -> Topic:
+    """True pose of base_link at rest, for viewers."""
+    return Topic(f"ground_truth/{robot}/pose", "geometry_msgs/msg/PoseStamped")
+
+
+def ground_truth_path(robot: str) -> Topic:
+    """True path of base_link at rest, for viewers."""
+    return Topic(f"ground_truth/{robot}/path", "nav_msgs/msg/Path", LATCHED)
+
+
+def formation_done(robot: str, formation: str = FORMATION, *, listeners: int = 1) -> Topic:
+    """The bare tick of a robot: the number of the timestep that it has finished."""
+    return Topic(f"{formation}/{robot}/done", "std_msgs/msg/UInt32", listeners=listeners)
+
+
+SURFACE = Topic("surface", "visualization_msgs/msg/Marker", LATCHED)
+CLOCK_TOPIC = Topic("/clock", "rosgraph_msgs/msg/Clock", CLOCK)
+DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", STATUS)
+MOVE = Topic("move", "geometry_msgs/msg/PoseStamped", listeners=1)
+MOVED = Topic("moved", "geometry_msgs/msg/PoseWithCovarianceStamped", listeners=1)
+ODOM = Topic("odom", "nav_msgs/msg/Odometry")
+BLOCKS = Topic("blocks", "sensor_msgs/msg/PointCloud2", listeners=1)
+BLOCKS_IMAGE = Topic("blocks/image", "sensor_msgs/msg/Image")
+DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStamped", listeners=1)
+RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", listeners=1)
+PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", listeners=1)
+ALIGNMENT = Topic("alignment", "std_msgs/msg/String")

@@ -1,0 +1,213 @@
+"""Runs a component as an rclpy node: parameters, topics, services, diagnostics, signals, exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import signal
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+from robot_formation import conversions, names
+from robot_formation.components.base import Component, Place
+from robot_formation.components.catalogue import KINDS
+from robot_formation.errors import FormationError
+from robot_formation.nodes.outbox import IMAGE_TYPE, Outbox
+from robot_formation.nodes.parameters import HostParameters, declare
+
+_IDLE_S = 0.1  # how often an idle node looks for signals
+_HELD_BACK_S = 0.01  # how often it looks for listeners while messages are held back
+_DIAGNOSTICS_S = 1.0
+_ACKNOWLEDGED_S = 2.0
+_BAD_INPUT = (FormationError, InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException)
+
+
+def qos_profile(qos: names.Qos) -> QoSProfile:
+    """Make rclpy's profile."""
+    return QoSProfile(
+        reliability=ReliabilityPolicy[qos.reliability.upper()],
+        durability=DurabilityPolicy[qos.durability.upper()],
+        history=HistoryPolicy[qos.history.upper()],
+        depth=qos.depth,
+    )
+
+
+def main_of(kind: str) -> int:
+    """Run the node of this kind until it ends; return its exit code (0 done, 2 bad parameter, or the component's)."""
+    return run_node(kind, lambda node: Host(node, kind).run())
+
+
+def run_node(name: str, body: Callable[[Node], int]) -> int:
+    """Make a node, run `body` with it and clean up; errors from outside become one line and exit code 2."""
+    # ROS's own handlers invalidate the context at once, which would lose what is still to be sent.
+    stop_on_signals()
+    node = None
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = Node(name, allow_undeclared_parameters=False)
+        return body(node)
+    except _BAD_INPUT as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 2
+    except rclpy.exceptions.ROSInterruptException:
+        return 0
+    except Exception as error:
+        if type(error).__name__ not in ("RCLError", "RCLInvalidROSArgsError", "UnknownROSArgsError"):
+            raise
+        print(f"{name}: {str(error).splitlines()[0]}", file=sys.stderr)
+        return 2
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+_stop = False
+
+
+def stop_on_signals() -> None:
+    """Let SIGINT and SIGTERM set a flag that the main loops look at."""
+
+    def handler(number: int, frame: Any) -> None:
+        global _stop
+        _stop = True
+
+    signal.signal(signal.SIGINT, handler)
+    signal.signal(signal.SIGTERM, handler)
+
+
+def stopped() -> bool:
+    """Tell whether a signal has asked this process to end."""
+    return _stop
+
+
+class Host:
+    """Connects one component to one rclpy node."""
+
+    def __init__(self, node: Node, kind: str) -> None:
+        self._node = node
+        entry = KINDS[kind]
+        parameters, self._parameters = declare(node, entry.parameter_class(), HostParameters)
+        robot = node.get_namespace().strip("/").rpartition("/")[2]
+        if entry.robots and not robot:
+            raise FormationError(f"{kind} belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1")
+        place = Place(robot if entry.robots else "", self._parameters.formation)
+        self._real_time_factor = getattr(parameters, "real_time_factor", 0.0)
+        self._component: Component = entry.component_class()(parameters, place)
+        self._outbox = Outbox(
+            node,
+            patience_s=self._parameters.wait_for_listeners_s,
+            recorder=self._parameters.recorder,
+            record_images=self._parameters.record_images,
+            warn=self._component.warn,
+        )
+        self._component.attach(self._outbox.send, self._say)
+        self._delays = random.Random(os.getpid())
+        self._publishers: dict[names.Topic, Any] = {}
+        self._connect()
+
+    def _connect(self) -> None:
+        node = self._node
+        for topic in self._component.outputs():
+            publisher = node.create_publisher(conversions.message_class(topic.type), topic.name, qos_profile(topic.qos))
+            self._publishers[topic] = publisher
+            self._outbox.add(topic, publisher)
+        for entry in self._component.inputs():
+            topic, handler = entry.topic, self._delayed(entry.handler)
+            node.create_subscription(conversions.message_class(topic.type), topic.name, handler, qos_profile(topic.qos))
+        for name, service in self._component.services().items():
+            node.create_service(Trigger, name, self._trigger(service))
+        health = names.DIAGNOSTICS
+        self._health = node.create_publisher(conversions.message_class(health.type), health.name, qos_profile(health.qos))
+        node.create_timer(_DIAGNOSTICS_S, self._publish_health)
+
+    def run(self) -> int:
+        """Spin until the component finishes or a signal comes; then make sure that everything sent has arrived."""
+        executor = SingleThreadedExecutor()
+        executor.add_node(self._node)
+        component, outbox = self._component, self._outbox
+        component.start()
+        pacer = Pacer(self._real_time_factor)
+        try:
+            while not stopped() and (component.exit_code is None or outbox.waiting):
+                outbox.flush()
+                busy = component.busy and not outbox.waiting
+                with contextlib.suppress(ExternalShutdownException):
+                    executor.spin_once(0.0 if busy else _HELD_BACK_S if outbox.waiting else _IDLE_S)
+                if component.busy and not outbox.waiting and component.exit_code is None:
+                    component.work()
+                    pacer.wait(component.stamp_ns)
+            if component.exit_code is not None:
+                self._say(0, component.exit_reason)
+            self._publish_health()
+        finally:
+            end = time.monotonic() + _ACKNOWLEDGED_S  # a listener that was killed never acknowledges
+            for publisher in self._publishers.values():
+                publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
+            executor.shutdown()
+        return component.exit_code or 0
+
+    def _delayed(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
+        longest = self._parameters.callback_delay_s
+        if longest <= 0.0:
+            return handler
+
+        def slow(message: Any) -> None:
+            time.sleep(self._delays.uniform(0.0, longest))
+            handler(message)
+
+        return slow
+
+    def _trigger(self, service: Callable[[], tuple[bool, str]]) -> Callable[[Any, Any], Any]:
+        def answer(request: Any, response: Any) -> Any:
+            response.success, response.message = service()
+            return response
+
+        return answer
+
+    def _say(self, level: int, text: str) -> None:
+        logger = self._node.get_logger()
+        (logger.info, logger.warning, logger.error)[level](text)
+
+    def _publish_health(self) -> None:
+        for topic, publisher in self._publishers.items():
+            if topic.listeners == 0 and topic.type == IMAGE_TYPE:
+                self._component.listened_to(topic, publisher.get_subscription_count())
+        health = self._component.health()
+        name = self._node.get_fully_qualified_name()
+        stamp_ns = self._component.stamp_ns
+        self._health.publish(conversions.diagnostics(name, health.level, health.text, health.values, stamp_ns))
+
+
+class Pacer:
+    """Holds simulated time to a multiple of wall time; a factor of 0 never waits."""
+
+    def __init__(self, factor: float) -> None:
+        self._factor = factor
+        self._wall_s: float | None = None
+        self._simulated_ns = 0
+
+    def wait(self, stamp_ns: int) -> None:
+        """Sleep until the wall clock has caught up. Standing still doesn't build up credit to be made good later."""
+        if self._factor <= 0.0:
+            return
+        now = time.monotonic()
+        step_s = (stamp_ns - self._simulated_ns) * 1e-9 / self._factor
+        self._simulated_ns = stamp_ns
+        due = max(now, (self._wall_s or now) + step_s)
+        self._wall_s = due
+        time.sleep(max(0.0, due - now))
+
+

@@ -1,0 +1,14 @@
+"""The `leader` executable; what the node does is in components/leader.py."""
+
+from __future__ import annotations
+
+from robot_formation.nodes.host import main_of
+
+
+def main() -> int:
+    """Run the node until it ends."""
+    return main_of("leader")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

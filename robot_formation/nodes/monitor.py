@@ -1,0 +1,58 @@
+"""A hidden node inside the launcher's own process that follows a run for its progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from types import TracebackType
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from robot_formation import conversions, names
+from robot_formation.nodes.host import qos_profile
+
+# Nodes whose names begin with an underscore are hidden: nobody waits for them, and lists leave them out.
+_NAME = "_monitor"
+
+
+class Monitor:
+    """Listens to topics of a domain; a context manager. `spin` takes what has arrived."""
+
+    def __init__(self, domain: int, topics: list[str], listen: Callable[[str, Any], None]) -> None:
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node(_NAME, context=self._context, start_parameter_services=False, enable_rosout=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._listen = listen
+        self.messages = 0
+        types = {topic.name: topic for topic in (names.MOVED, names.ALIGNMENT, names.DISPLACEMENT)}
+        for name in topics:
+            topic = types.get(name.rpartition("/")[2]) or names.ground_truth_pose("")
+            message_class = conversions.message_class(topic.type)
+            self._node.create_subscription(message_class, name, partial(self._take, name), qos_profile(topic.qos))
+
+    def spin(self, timeout_s: float) -> None:
+        """Wait for a message at most so long; take it and what else is there."""
+        before = self.messages
+        self._executor.spin_once(timeout_s)
+        while self.messages != before:
+            before = self.messages
+            self._executor.spin_once(0.0)
+
+    def __enter__(self) -> Monitor:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+    def _take(self, topic: str, message: Any) -> None:
+        self.messages += 1
+        self._listen(topic, message)

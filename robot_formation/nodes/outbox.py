@@ -1,0 +1,83 @@
+"""Holds messages back until their listeners are there, so that discovery can't swallow the first ones."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+from robot_formation.names import Topic
+
+IMAGE_TYPE = "sensor_msgs/msg/Image"
+
+
+class Outbox:
+    """Publishes in order; the first message of a topic waits, at most for a while, until all its listeners have matched.
+
+    A reliable publisher that has matched a subscription delivers everything that it publishes from then on, so nothing
+    needs to be known of the other side. Hidden nodes (names that begin with an underscore) are not waited for and don't count.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        *,
+        patience_s: float,
+        recorder: str,
+        record_images: bool,
+        warn: Callable[[str], None],
+    ) -> None:
+        self._node = node
+        self._patience_s = patience_s
+        self._recorder = recorder
+        self._record_images = record_images
+        self._warn = warn
+        self._publishers: dict[Topic, Publisher] = {}
+        self._ready: set[Topic] = set()
+        self._waiting: deque[tuple[Topic, Any]] = deque()
+        self._since: float | None = None
+
+    def add(self, topic: Topic, publisher: Publisher) -> None:
+        """Make a topic known."""
+        self._publishers[topic] = publisher
+        recorded = self._recorder and (self._record_images or topic.type != IMAGE_TYPE)
+        if topic.listeners == 0 and not recorded:
+            self._ready.add(topic)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether messages are held back."""
+        return bool(self._waiting)
+
+    def send(self, topic: Topic, message: Any) -> None:
+        """Publish now, or as soon as everything sent before is out and the listeners are there."""
+        self._waiting.append((topic, message))
+        self.flush()
+
+    def flush(self) -> None:
+        """Publish what need not wait any more."""
+        while self._waiting:
+            topic, message = self._waiting[0]
+            if topic not in self._ready and not self._matched(topic):
+                if self._since is None:
+                    self._since = time.monotonic()
+                if time.monotonic() - self._since < self._patience_s:
+                    return
+                self._warn(f"nobody listens to {self._publishers[topic].topic_name}: going on")
+            self._since = None
+            self._ready.add(topic)
+            self._publishers[topic].publish(message)
+            self._waiting.popleft()
+
+    def _matched(self, topic: Topic) -> bool:
+        publisher = self._publishers[topic]
+        found = self._node.get_subscriptions_info_by_topic(publisher.topic_name)
+        nodes = {(info.node_namespace, info.node_name) for info in found if not info.node_name.startswith("_")}
+        recorders = {node for node in nodes if node[1] == self._recorder}
+        if self._recorder and not recorders and (self._record_images or topic.type != IMAGE_TYPE):
+            return False
+        return len(nodes - recorders) >= topic.listeners and publisher.get_subscription_count() >= len(found)

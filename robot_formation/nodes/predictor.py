@@ -1,0 +1,14 @@
+"""The `predictor` executable; what the node does is in components/predictor.py."""
+
+from __future__ import annotations
+
+from robot_formation.nodes.host import main_of
+
+
+def main() -> int:
+    """Run the node until it ends."""
+    return main_of("predictor")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,177 @@
+"""Parameters as frozen dataclasses: one source for type, default, unit, range and description.
+
+A node's dataclass declares its ROS parameters, validates YAML and makes the table in the docs. Nested dataclasses
+become dotted names (``robot.wheel_radius_m``), the form that ROS parameters use.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import types
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from robot_formation.errors import FormationError
+
+T = TypeVar("T")
+
+_ELEMENTS: dict[Any, type] = {
+    tuple[float, ...]: float,
+    tuple[int, ...]: int,
+    tuple[str, ...]: str,
+}
+
+
+class ParameterError(FormationError):
+    """A parameter has an unknown name, a wrong type or a value outside its range; the text says which and what to do."""
+
+
+@dataclass(frozen=True)
+class Spec:
+    """One parameter: dotted name, Python type, default, unit, closed range or choices, description."""
+
+    name: str
+    type: Any
+    default: Any
+    unit: str
+    low: float | None
+    high: float | None
+    choices: tuple[Any, ...]
+    description: str
+
+
+def parameter(
+    default: Any,
+    description: str,
+    *,
+    unit: str = "",
+    low: float | None = None,
+    high: float | None = None,
+    choices: tuple[Any, ...] = (),
+) -> Any:
+    """Make a dataclass field that carries its unit, closed range [low, high] or choices, and description."""
+    metadata = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices}
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def specs(cls: type, prefix: str = "") -> dict[str, Spec]:
+    """List the parameters of a dataclass by dotted name, nested dataclasses included."""
+    found: dict[str, Spec] = {}
+    hints = typing.get_type_hints(cls)
+    for field in dataclasses.fields(cls):
+        kind = hints[field.name]
+        name = prefix + field.name
+        if dataclasses.is_dataclass(kind):
+            found.update(specs(typing.cast(type, kind), name + "."))
+            continue
+        meta = field.metadata
+        default = field.default
+        found[name] = Spec(
+            name, kind, default, meta["unit"], meta["low"], meta["high"], tuple(meta["choices"]), meta["description"]
+        )
+    return found
+
+
+def flatten(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Turn nested mappings into one with dotted names."""
+    flat: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            flat.update(flatten(value, f"{prefix}{key}."))
+        else:
+            flat[f"{prefix}{key}"] = value
+    return flat
+
+
+def to_mapping(instance: Any, prefix: str = "") -> dict[str, Any]:
+    """Turn a parameter object into a mapping of dotted names to plain values (tuples become lists)."""
+    values: dict[str, Any] = {}
+    for field in dataclasses.fields(instance):
+        value = getattr(instance, field.name)
+        if dataclasses.is_dataclass(value):
+            values.update(to_mapping(value, f"{prefix}{field.name}."))
+        else:
+            values[prefix + field.name] = list(value) if isinstance(value, tuple) else value
+    return values
+
+
+def from_mapping(cls: type[T], values: Mapping[str, Any], *, where: str) -> T:
+    """Build and check a parameter object from nested or dotted names.
+
+    Args:
+        cls: a frozen dataclass whose fields are made by `parameter` or are such dataclasses themselves.
+        values: any subset of the parameters; the others keep their defaults.
+        where: what the values belong to, for messages ("config/world.yaml", "drive").
+
+    Raises:
+        ParameterError: on an unknown name, a wrong type, or a value outside its range or choices.
+    """
+    known = specs(cls)
+    flat = flatten(values)
+    for name in flat:
+        if name not in known:
+            raise ParameterError(f"{where}: no parameter '{name}'{suggestion(name, known)}")
+    return _build(cls, {name: check(known[name], value, where=where) for name, value in flat.items()})
+
+
+def suggestion(name: str, known: typing.Iterable[str]) -> str:
+    """Say which known name was probably meant, or list what there is."""
+    candidates = list(known)
+    near = difflib.get_close_matches(name, candidates, n=1)
+    if not near:
+        near = [c for c in candidates if c.rsplit(".", 1)[-1] == name.rsplit(".", 1)[-1]][:1]
+    if near:
+        return f"; did you mean '{near[0]}'?"
+    return "; there are: " + ", ".join(sorted(candidates)) if candidates else ""
+
+
+def check(spec: Spec, value: Any, *, where: str) -> Any:
+    """Return the value in the parameter's type, or raise ParameterError."""
+    if spec.type in _ELEMENTS:
+        if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
+            raise ParameterError(f"{where}: '{spec.name}' must be a list, not {value!r}")
+        return tuple(_check_one(spec, _ELEMENTS[spec.type], item, where) for item in value)
+    kind = spec.type
+    if typing.get_origin(kind) in (typing.Union, types.UnionType):
+        raise TypeError(f"{spec.name}: optional parameters are not supported; use a neutral default")
+    return _check_one(spec, kind, value, where)
+
+
+def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
+    wrong = ParameterError(f"{where}: '{spec.name}' must be of type {kind.__name__}, not {value!r}")
+    if kind is float:
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise wrong
+        value = float(value)
+        if not math.isfinite(value):
+            raise ParameterError(f"{where}: '{spec.name}' must be finite, not {value!r}")
+    elif kind is int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise wrong
+    elif not isinstance(value, kind):
+        raise wrong
+    if spec.choices and value not in spec.choices:
+        hint = suggestion(str(value), [str(c) for c in spec.choices])
+        raise ParameterError(f"{where}: '{spec.name}' can't be {value!r}{hint}")
+    low, high = spec.low, spec.high
+    if (low is not None and value < low) or (high is not None and value > high):
+        limits = f"{'-inf' if low is None else low} to {'inf' if high is None else high} {spec.unit}".rstrip()
+        raise ParameterError(f"{where}: '{spec.name}' is {value!r}, outside {limits}")
+    return value
+
+
+def _build(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:
+    hints = typing.get_type_hints(cls)
+    arguments: dict[str, Any] = {}
+    for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+        kind = hints[field.name]
+        name = prefix + field.name
+        if dataclasses.is_dataclass(kind):
+            arguments[field.name] = _build(typing.cast(type, kind), flat, name + ".")
+        elif name in flat:
+            arguments[field.name] = flat[name]
+    return cls(**arguments)

@@ -1,0 +1,95 @@
+"""Run-time bounds and the colour table: which colour differences belong to which signature (Pixy2 behaviour)."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from robot_formation.vision.parameters import SIGNATURES, DetectorParameters
+from robot_formation.vision.signatures import Signature
+from robot_formation.vision.teaching import SCALE_BITS
+
+BINS = 64
+"""Bins per axis: the difference r-g (or b-g) of -255..255 in steps of 8."""
+_CODE_GAIN = np.float32(1.5)
+
+
+def is_code(signature: Signature, mode: int) -> bool:
+    """Whether a signature makes colour codes rather than boxes in this colour code mode."""
+    return mode == 2 or (mode != 0 and signature.type == 1)
+
+
+def run_time_bounds(signature: Signature, gain: float, *, code: bool = False) -> tuple[int, int, int, int]:
+    """Chroma bounds u_min, u_max, v_min, v_max in force, all exclusive, in 1/32768.
+
+    Args:
+        signature: the taught bounds.
+        gain: "Signature range", which stretches the taught interval about its middle.
+        code: whether the signature makes colour codes; its range then counts 1.5 times.
+    """
+    factor = np.float32(gain) * _CODE_GAIN if code else np.float32(gain)
+
+    def stretched(bound: int, mean: int) -> int:
+        return int(np.float32(mean) + np.float32(bound - mean) * factor)
+
+    return (
+        stretched(signature.u_min, signature.u_mean),
+        stretched(signature.u_max, signature.u_mean),
+        stretched(signature.v_min, signature.v_mean),
+        stretched(signature.v_max, signature.v_mean),
+    )
+
+
+@dataclass(frozen=True)
+class ColorTable:
+    """All that the scanner asks per cell.
+
+    Attributes:
+        labels: signature number or 0 by 64 * iu + iv, shape (4096,), uint8; iu = ((r-g) >> 3) + 32, iv alike from b-g.
+        low: exclusive lower bounds of u and v by signature number, shape (2, 8).
+        high: exclusive upper bounds, alike.
+        min_sum: smallest r+g+b.
+    """
+
+    labels: npt.NDArray[np.uint8]
+    low: npt.NDArray[np.float64]
+    high: npt.NDArray[np.float64]
+    min_sum: int
+
+    @classmethod
+    def of(cls, signatures: Iterable[Signature], parameters: DetectorParameters) -> ColorTable:
+        """Build the table; about 10 ms, so once per change of signatures or parameters, not per frame."""
+        u, v, total, bins = _colors()
+        min_sum = max(1, int(np.float32(765) * np.float32(parameters.min_brightness)))
+        labels = np.zeros(BINS * BINS, np.uint8)
+        low, high = np.zeros((2, 2, SIGNATURES + 1))
+        # Lower numbers win, hence are written last.
+        for signature in sorted(signatures, key=lambda s: -s.sig):
+            if signature.u_min == signature.u_max == 0:
+                continue
+            code = is_code(signature, parameters.color_code_mode)
+            u_min, u_max, v_min, v_max = run_time_bounds(signature, parameters.range_of(signature.sig), code=code)
+            inside = (u > u_min) & (u < u_max) & (v > v_min) & (v < v_max) & (total >= min_sum)
+            labels[bins[inside]] = signature.sig
+            low[:, signature.sig] = u_min, v_min
+            high[:, signature.sig] = u_max, v_max
+        return cls(labels, low, high, min_sum)
+
+
+_Int32 = npt.NDArray[np.int32]
+
+
+@functools.cache
+def _colors() -> tuple[_Int32, _Int32, _Int32, _Int32]:
+    """Chroma u and v, sum and table index of every fourth level of r, g and b, each of shape (262144,)."""
+    r, g, b = (axis.ravel() for axis in np.meshgrid(*[np.arange(0, 256, 4, dtype=np.int32)] * 3, indexing="ij"))
+    total = r + g + b
+    divisor = np.maximum(total, 1)
+    u = ((r - g << SCALE_BITS) / divisor).astype(np.int32)
+    v = ((b - g << SCALE_BITS) / divisor).astype(np.int32)
+    bins = ((r - g >> 3) + BINS // 2) * BINS + (b - g >> 3) + BINS // 2
+    return u, v, total, bins

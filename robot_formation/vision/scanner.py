@@ -1,0 +1,139 @@
+"""From the picture to row segments: labels per cell, hits along each row, runs of hits (Pixy2 behaviour)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from robot_formation.vision.color_table import BINS, ColorTable
+from robot_formation.vision.picture import CELLS, HEIGHT, Picture
+from robot_formation.vision.teaching import SCALE_BITS
+
+_STEP = 4
+"""Cells from one hit to the next in a run of equal labels."""
+_OVERSHOOT = np.array((0, 1, 2, 1))
+"""Cells skipped after a run, by the number of its cells from the first one looked at, modulo 4."""
+_CHROMA_SCALE = float(1 << SCALE_BITS)
+_BRIDGE = 6
+"""Hits of one signature up to this many cells apart belong to one segment."""
+
+IntArray = npt.NDArray[np.int64]
+
+
+class Segments(NamedTuple):
+    """Row segments in the order of the scan, each array of shape (n,): a segment covers cells start..end inclusive."""
+
+    signature: IntArray
+    row: IntArray
+    start: IntArray
+    end: IntArray
+
+
+_NONE = Segments(*[np.empty(0, np.int64)] * 4)
+
+
+def scan(picture: Picture, table: ColorTable) -> Segments:
+    """Find the row segments of all signatures in a picture of shape (208, 316, 3), uint8."""
+    planes = _planes(picture)
+    first, signature = _hits(_labels(planes, table))
+    if not len(first):
+        return _NONE
+    flat = planes.reshape(3, -1)
+    colors = flat.take(first, axis=1).astype(np.int32) + flat.take(first + 1, axis=1)
+    total = np.maximum(colors[0] + colors[1] + colors[2], 1)
+    # Exact: both operands are below 2**25, where the double's quotient truncates as the integer division does.
+    chroma = np.trunc((colors[::2] - colors[1]) * _CHROMA_SCALE / total)
+    inside = (chroma > table.low.take(signature, axis=1)) & (chroma < table.high.take(signature, axis=1))
+    kept = np.flatnonzero(inside[0] & inside[1] & (total >= table.min_sum))
+    if not len(kept):
+        return _NONE
+    row, column = np.divmod(first[kept], CELLS)
+    return _segments(signature[kept], row, column + 1)
+
+
+def _planes(picture: Picture) -> npt.NDArray[np.uint8]:
+    """Red, green and blue of the pixels that the cells look at, shape (3, 208, 158)."""
+    # Six channels per cell: the pixel that is looked at and its neighbour, which is not.
+    planes = np.empty((3, HEIGHT, CELLS), np.uint8)
+    cv2.mixChannels([picture.reshape(HEIGHT, CELLS, 6)], list(planes), [0, 0, 1, 1, 2, 2])
+    return planes
+
+
+def _labels(planes: npt.NDArray[np.uint8], table: ColorTable) -> npt.NDArray[np.uint8]:
+    """Signature number or 0 of each cell, shape (208, 158)."""
+    r, g, b = planes
+    # d / 8 + 32 - 7/16 rounds to (d >> 3) + 32 for every integer d; one vectorised pass instead of four.
+    offset = BINS / 2 - 0.4375
+    iu = cv2.addWeighted(r, 0.125, g, -0.125, offset)
+    iv = cv2.addWeighted(b, 0.125, g, -0.125, offset)
+    index = iu.astype(np.uint16)
+    index *= BINS
+    index += iv
+    labels: npt.NDArray[np.uint8] = table.labels.take(index.astype(np.intp))
+    return labels
+
+
+def _hits(labels: npt.NDArray[np.uint8]) -> tuple[IntArray, IntArray]:
+    """First cells (index 158 * row + column) and signatures of the pairs of equal labels that the scanner stores.
+
+    The scanner moves on by one cell without a label, by two after a label without an equal neighbour and by four after
+    a pair. So a run of equal labels yields a hit every four cells from where the scanner enters it, and how far it
+    enters depends on the run before it only if that is nearer than two cells.
+    """
+    change = np.empty(labels.shape, np.bool_)
+    np.not_equal(labels[:, 1:], labels[:, :-1], out=change[:, 1:])
+    change[:, 0] = True
+    bounds = np.append(np.flatnonzero(change), labels.size)
+    label = labels.ravel()[bounds[:-1]]
+    runs = np.flatnonzero(label)
+    start, stop = bounds[runs], bounds[runs + 1]
+    rest = stop - start - _entries(start, stop)
+    count = np.maximum(rest + 2, 0) >> 2
+    before = np.cumsum(count) - count
+    first = np.repeat(stop - rest - _STEP * before, count)
+    first += _STEP * np.arange(len(first))
+    return first, np.repeat(label[runs].astype(np.int64), count)
+
+
+def _entries(start: IntArray, stop: IntArray) -> IntArray:
+    """Cells of each run [start, stop) that the scanner skips before it looks at one; may exceed the run."""
+    entry = np.zeros(len(start), np.int64)
+    gap = start[1:] - stop[:-1]
+    near = np.flatnonzero((gap < 2) & (start[1:] // CELLS == start[:-1] // CELLS))
+    if not len(near):
+        return entry
+    gap = gap[near]
+    length = (stop - start)[near]
+    # Each entry follows from the one before it alone: the sweeps end with the only solution, mostly after two or three.
+    while True:
+        rest = length - entry[near]
+        past = np.where(rest > 0, _OVERSHOOT[rest & 3], -rest)
+        settled = np.maximum(past - gap, 0)
+        if np.array_equal(settled, entry[near + 1]):
+            return entry
+        entry[near + 1] = settled
+
+
+def _segments(signature: IntArray, row: IntArray, column: IntArray) -> Segments:
+    """Join hits to segments.
+
+    Only the last segment of a row gets its true first cell, and that of the picture's last row is lost.
+    """
+    same_row = row[1:] == row[:-1]
+    near = same_row & (column[1:] - column[:-1] <= _BRIDGE)
+    same_signature = signature[1:] == signature[:-1]
+    begins = np.concatenate(([0], np.flatnonzero(~(near & same_signature)) + 1))
+    last = np.append(begins[1:] - 1, len(column) - 1)
+    # What follows a segment's last hit: a near hit of another signature ends it there, a row's end closes it.
+    cut = np.append(near & ~same_signature, False)[last]
+    closed = np.append(~same_row, True)[last]
+    end = column[last] + 1
+    end[cut] = column[last[cut] + 1]
+    start = column[begins] - closed
+    segments = Segments(signature[begins], row[begins], start, end)
+    if closed[-1] and segments.row[-1] == HEIGHT - 1:
+        return Segments(*(array[:-1] for array in segments))
+    return segments

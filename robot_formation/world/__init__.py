@@ -1,0 +1,28 @@
+"""Simulated robots and cameras on a surface: bodies, traction, motors, encoders, pictures, and the rule of time."""
+
+from robot_formation.world.camera import Camera, Picture, Sensor
+from robot_formation.world.events import JOINT_NAMES, BodyState, Event, Frame, JointStates, RobotPose
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import Pose, pose_on_surface
+from robot_formation.world.robot import RobotStart
+from robot_formation.world.teaching import marker_picture
+from robot_formation.world.world import World, WorldError
+
+__all__ = [
+    "JOINT_NAMES",
+    "BodyState",
+    "Camera",
+    "Event",
+    "Frame",
+    "JointStates",
+    "Picture",
+    "Pose",
+    "RobotPose",
+    "RobotStart",
+    "Sensor",
+    "World",
+    "WorldError",
+    "WorldParameters",
+    "marker_picture",
+    "pose_on_surface",
+]

@@ -1,0 +1,91 @@
+"""Poses in space, and how a robot stands on the ground."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation.surface import Surface
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a frame is in the world: position in metres, orientation as a unit quaternion (x, y, z, w)."""
+
+    position: Vector
+    orientation: Quaternion
+
+    @property
+    def yaw_rad(self) -> float:
+        """Heading: direction of the x axis seen from above, counter-clockwise from world x."""
+        x, y, z, w = self.orientation
+        return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+    @property
+    def pitch_rad(self) -> float:
+        """Rotation about y after yaw, positive nose down (REP-103)."""
+        x, y, z, w = self.orientation
+        return math.asin(max(-1.0, min(1.0, 2.0 * (w * y - x * z))))
+
+    @property
+    def roll_rad(self) -> float:
+        """Rotation about x after yaw and pitch, positive right side down (REP-103)."""
+        x, y, z, w = self.orientation
+        return math.atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+
+    def matrix(self) -> NDArray[np.float64]:
+        """Rotation matrix (3, 3): columns are the frame's axes in the world."""
+        x, y, z, w = self.orientation
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+
+def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Unit quaternion (x, y, z, w) of fixed-axis roll, pitch, yaw in radians."""
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def rotate(orientation: Quaternion, vector: Vector) -> Vector:
+    """Rotate a vector by a unit quaternion."""
+    x, y, z, w = orientation
+    a, b, c = vector
+    # v + w t + q x t with t = 2 q x v
+    t_x, t_y, t_z = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return (a + w * t_x + y * t_z - z * t_y, b + w * t_y + z * t_x - x * t_z, c + w * t_z + x * t_y - y * t_x)
+
+
+def pose_on_surface(
+    surface: Surface, x_m: float, y_m: float, heading_rad: float, *, wheelbase_m: float = 0.22, track_m: float = 0.19
+) -> Pose:
+    """Pose of base_link for a robot that stands with its four wheels on the surface.
+
+    Roll, pitch and height come from the ground under the wheels, so on a hollow the origin hangs a little above it.
+    """
+    c, s = math.cos(heading_rad), math.sin(heading_rad)
+    a, b = 0.5 * wheelbase_m, 0.5 * track_m
+    corners = ((a, b), (a, -b), (-a, b), (-a, -b))
+    fl, fr, rl, rr = (surface.height(x_m + c * p - s * q, y_m + s * p + c * q) for p, q in corners)
+    along = (fl + fr - rl - rr) / (4.0 * a)
+    across = (fl + rl - fr - rr) / (4.0 * b)
+    pitch = -math.atan(along)
+    roll = math.atan(across * math.cos(pitch))
+    return Pose((x_m, y_m, 0.25 * (fl + fr + rl + rr)), quaternion(roll, pitch, heading_rad))

@@ -1,0 +1,106 @@
+"""The visible world as convex faces with their linear light: wall, plate, robots with their markers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation.surface import Surface
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import Pose
+
+Array = NDArray[np.float64]
+Colour = tuple[float, float, float]
+Face = tuple[Array, Colour]
+
+FULL = 65535.0
+"""Linear light 1 in the 16-bit drawing."""
+PEDESTAL_M = 0.03
+"""Edge of the post between body and marker."""
+
+_BOX = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+_SIDES: tuple[tuple[tuple[int, int, int, int], tuple[float, float, float]], ...] = (
+    ((4, 5, 7, 6), (1.0, 0.0, 0.0)),
+    ((0, 1, 3, 2), (-1.0, 0.0, 0.0)),
+    ((2, 3, 7, 6), (0.0, 1.0, 0.0)),
+    ((0, 1, 5, 4), (0.0, -1.0, 0.0)),
+    ((1, 3, 7, 5), (0.0, 0.0, 1.0)),
+)
+"""Corner indices and normals: front, rear, left, right, top (the bottom is never seen)."""
+
+
+class Scene:
+    """Faces to draw, with ambient light and one lamp (Lambert); light is linear, 65535 is full.
+
+    Attributes:
+        wall_light: linear light of the background, 0 to 1.
+        plate_points: corners of the plate's patches in the world, (n, 3), metres.
+        patch_corners: indices of each patch's four corners, (patches, 4).
+        patch_light: red, green, blue of each patch.
+    """
+
+    def __init__(self, surface: Surface, parameters: WorldParameters) -> None:
+        camera, marker, chassis = parameters.camera, parameters.marker, parameters.chassis
+        lamp = np.array([camera.light_x, camera.light_y, camera.light_z])
+        self._lamp = lamp / np.linalg.norm(lamp)
+        self._ambient = camera.ambient
+        # The exposure puts the evenly lit wall at the asked 8-bit level.
+        wall = (camera.background_level / 255.0) ** camera.gamma
+        self._exposure = wall / (camera.wall_albedo / 255.0)
+        self.wall_light = wall
+        grey = marker.body_rgb
+        body = (chassis.length_m, chassis.width_m, chassis.body_top_m - chassis.body_bottom_m)
+        foot = marker.top_m - marker.edge_m
+        cube = (marker.target_rgb, marker.front_rgb, marker.rear_rgb)
+        self._faces: list[tuple[Array, Array, Array]] = []
+        self._add_box(body, chassis.body_bottom_m, (grey,) * 5)
+        if foot > chassis.body_top_m:
+            self._add_box((PEDESTAL_M, PEDESTAL_M, foot - chassis.body_top_m), chassis.body_top_m, (grey,) * 5)
+        target, front, rear = cube
+        self._add_box((marker.edge_m,) * 3, foot, (front, rear, grey, target, grey))
+        around = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+        dot = np.stack([np.cos(around), np.sin(around), np.zeros(16)], axis=1) * marker.dot_radius_m
+        self._add_face(dot + np.array([0.0, 0.0, marker.top_m]), np.array([0.0, 0.0, 1.0]), marker.dot_rgb)
+        self._make_plate(surface, camera.plate_patches, camera.plate_albedo)
+
+    def _add_box(self, size: tuple[float, ...], bottom: float, colours: tuple[tuple[int, ...], ...]) -> None:
+        corners = _BOX * size + [0.0, 0.0, bottom + 0.5 * size[2]]
+        for (indices, normal), colour in zip(_SIDES, colours, strict=True):
+            self._add_face(corners[list(indices)], np.array(normal), colour)
+
+    def _add_face(self, corners: Array, normal: Array, colour: tuple[int, ...]) -> None:
+        self._faces.append((corners, normal, np.array(colour) / 255.0))
+
+    def _make_plate(self, surface: Surface, patches: int, albedo: int) -> None:
+        edge = np.linspace(0.0, surface.size_m, patches + 1)
+        xs, ys = np.meshgrid(edge, edge, indexing="ij")
+        self.plate_points = np.stack([xs, ys, surface.heights(xs, ys)], axis=-1).reshape(-1, 3)
+        middles = 0.5 * (edge[1:] + edge[:-1])
+        corners: list[list[int]] = []
+        self.patch_light: list[Colour] = []
+        for i, x in enumerate(middles):
+            for j, y in enumerate(middles):
+                first = i * (patches + 1) + j
+                corners.append([first, first + 1, first + patches + 2, first + patches + 1])
+                # Two slightly different greys make the patches visible without colour.
+                tone = albedo / 255.0 * (1.0 if (i + j) % 2 else 0.96)
+                normal = np.array(surface.normal(float(x), float(y)))
+                self.patch_light.append(self._shade(normal, np.full(3, tone)))
+        self.patch_corners = np.array(corners)
+
+    def _shade(self, normal: Array, albedo: Array) -> Colour:
+        """Linear light of a face in 16-bit units, at most full."""
+        light = self._ambient + (1.0 - self._ambient) * max(0.0, float(normal @ self._lamp))
+        r, g, b = np.minimum(albedo * (light * self._exposure), 1.0) * FULL
+        return (float(r), float(g), float(b))
+
+    def robot_faces(self, robot: Pose, lens: Array) -> Iterator[Face]:
+        """Faces of a robot that are turned to the lens, in the world frame, in drawing order: body, post, marker."""
+        rotation = robot.matrix()
+        position = np.asarray(robot.position)
+        eye = rotation.T @ (lens - position)
+        for corners, normal, albedo in self._faces:
+            if float(normal @ (eye - corners[0])) > 0.0:
+                yield corners @ rotation.T + position, self._shade(rotation @ normal, albedo)

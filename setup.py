@@ -1,0 +1,64 @@
+"""The package as colcon (ament_python) and pip install it; pyproject.toml holds the tools' settings only."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "robot_formation"
+NODES = ("world", "drive", "leader", "block_detector", "predictor", "fine_tuner", "recorder")
+
+
+def shared(folder: str) -> list[tuple[str, list[str]]]:
+    """List a folder's files, sub-folders included, by the place under the prefix where they are installed."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(Path(folder).rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            found.setdefault(f"share/{NAME}/{path.parent.as_posix()}", []).append(path.as_posix())
+    return list(found.items())
+
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Robot formation control on an unknown curved surface by Koopman prediction and a camera (ROS 2)",
+    license="Apache-2.0",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        *shared("config"),
+        *shared("launch"),
+    ],
+    python_requires=">=3.10",
+    install_requires=[
+        "PyYAML",
+        "matplotlib",
+        "mcap",
+        "numpy",
+        "opencv-python-headless",
+        "pybullet",
+        "rosbags>=0.11.2",
+        "zstandard",
+    ],
+    extras_require={
+        # ROS 2 Jazzy where none is installed. Not among the requirements: a ROS install brings its own.
+        "pip": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
+        "test": [
+            "colcon-common-extensions",
+            "hypothesis",
+            "mypy",
+            "pytest",
+            "pytest-xdist",
+            "ruff",
+            "types-PyYAML",
+        ],
+    },
+    entry_points={
+        "console_scripts": [
+            "formation = robot_formation.cli.main:main",
+            *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
+        ]
+    },
+    zip_safe=False,
+)

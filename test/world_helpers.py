@@ -1,0 +1,53 @@
+"""What the tests of the world share."""
+
+import math
+
+from robot_formation.parameters import from_mapping
+from robot_formation.surface import make_surface
+from robot_formation.world import RobotStart, World, WorldParameters
+
+IDEAL = {
+    "imperfections": {
+        "rolling_radius": 0.0,
+        "motor_gain": 0.0,
+        "mass_offset_m": 0.0,
+        "encoder_wheel_radius": 0.0,
+        "stop_common_m": 0.0,
+        "stop_wheel_m": 0.0,
+    }
+}
+STRAIGHT = (1.0, 1.0, 1.0, 1.0)
+SPEEDS = (4.0,) * 4
+PAIR = (
+    RobotStart("leader", 0.763, 0.3, math.pi / 2, camera=False),
+    RobotStart("follower_1", 1.083, 0.3, math.pi / 2),
+)
+
+
+def parameters(**values):
+    return from_mapping(WorldParameters, values, where="test")
+
+
+def world(surface="plane", robots=PAIR, *, seed=1, **values):
+    return World(make_surface(surface), robots, parameters(**values), seed=seed)
+
+
+def run(a_world):
+    """Advance until nothing is owed; all events."""
+    events = []
+    while batch := a_world.advance():
+        events += batch
+    return events
+
+
+def of_kind(events, kind, robot=None):
+    return [event for event in events if isinstance(event, kind) and robot in (None, event.robot)]
+
+
+def displacement(a_world, robot, start):
+    """Forward, left and turn from a body state to the present one, in the frame of the former."""
+    now = a_world.ground_truth(robot)
+    c, s = math.cos(start.yaw_rad), math.sin(start.yaw_rad)
+    dx, dy = now.x_m - start.x_m, now.y_m - start.y_m
+    turn = math.remainder(now.yaw_rad - start.yaw_rad, 2 * math.pi)
+    return c * dx + s * dy, -s * dx + c * dy, turn
