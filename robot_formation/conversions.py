@@ -117,9 +117,13 @@ def joint_command(command: WheelCommand, stamp_ns: int) -> JointState:
 def read_joint_command(message: JointState) -> WheelCommand:
     """Read relative wheel angles and speed limits in any joint order."""
     if sorted(message.name) != sorted(WHEELS):
-        raise MessageError(f"joint_commands must name {', '.join(WHEELS)} once each, not {', '.join(message.name) or 'nothing'}")
+        raise MessageError(
+            f"joint_commands must name {', '.join(WHEELS)} once each, not {', '.join(message.name) or 'nothing'}"
+        )
     if len(message.position) != len(WHEELS) or len(message.velocity) != len(WHEELS):
-        raise MessageError(f"joint_commands must have {len(WHEELS)} positions (rad) and {len(WHEELS)} velocities (rad/s)")
+        raise MessageError(
+            f"joint_commands must have {len(WHEELS)} positions (rad) and {len(WHEELS)} velocities (rad/s)"
+        )
     order = [list(message.name).index(name) for name in WHEELS]
     angles = tuple(float(message.position[i]) for i in order)
     limits = tuple(float(message.velocity[i]) for i in order)
@@ -130,7 +134,9 @@ def read_joint_command(message: JointState) -> WheelCommand:
     return WheelCommand(angles, limits)
 
 
-def joint_states(names: Sequence[str], positions: Sequence[float], velocities: Sequence[float], stamp_ns: int) -> JointState:
+def joint_states(
+    names: Sequence[str], positions: Sequence[float], velocities: Sequence[float], stamp_ns: int
+) -> JointState:
     """Make the joints' report: positions [rad], velocities [rad/s]."""
     return JointState(header=header(stamp_ns), name=list(names), position=list(positions), velocity=list(velocities))
 
@@ -140,7 +146,9 @@ def read_joint_states(message: JointState) -> tuple[list[float], list[float]]:
     index = {name: i for i, name in enumerate(message.name)}
     missing = [name for name in JOINTS if name not in index]
     if missing or len(message.position) != len(index) or len(message.velocity) != len(index):
-        raise MessageError(f"joint_states must have position and velocity of {', '.join(JOINTS)}; missing: {', '.join(missing)}")
+        raise MessageError(
+            f"joint_states must have position and velocity of {', '.join(JOINTS)}; missing: {', '.join(missing)}"
+        )
     positions = [float(message.position[index[name]]) for name in JOINTS]
     velocities = [float(message.velocity[index[name]]) for name in JOINTS]
     if not all(map(math.isfinite, positions + velocities)):
@@ -254,7 +262,9 @@ def read_image(message: Image) -> NDArray[np.uint8]:
         raise MessageError(f"image encoding '{message.encoding}' has no colour to find blocks by; send rgb8 or bgr8")
     height, width, step = int(message.height), int(message.width), int(message.step)
     if height < 1 or width < 1 or step < 3 * width or len(message.data) < step * height:
-        raise MessageError(f"image of {width} x {height}, step {step}, has {len(message.data)} bytes: cut off or mis-sized")
+        raise MessageError(
+            f"image of {width} x {height}, step {step}, has {len(message.data)} bytes: cut off or mis-sized"
+        )
     rows = np.frombuffer(message.data, dtype=np.uint8, count=step * height).reshape(height, step)
     pixels = rows[:, : 3 * width].reshape(height, width, 3)
     return pixels[:, :, ::-1] if message.encoding == "bgr8" else pixels
@@ -303,7 +313,9 @@ def read_blocks(message: PointCloud2) -> list[Block]:
     """Read blocks."""
     names = [field.name for field in message.fields]
     if names != list(BLOCK_DTYPE.names or ()) or message.point_step != BLOCK_DTYPE.itemsize or message.is_bigendian:
-        raise MessageError(f"blocks must have the fields {', '.join(BLOCK_DTYPE.names or ())}, little endian, not {names}")
+        raise MessageError(
+            f"blocks must have the fields {', '.join(BLOCK_DTYPE.names or ())}, little endian, not {names}"
+        )
     if len(message.data) != message.width * message.height * BLOCK_DTYPE.itemsize:
         raise MessageError(f"blocks of {message.width} points have {len(message.data)} bytes: cut off or mis-sized")
     points = np.frombuffer(message.data, dtype=BLOCK_DTYPE)

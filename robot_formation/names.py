@@ -28,6 +28,8 @@ class Qos:
 
 
 EVENT = Qos()
+# What happened rarely is worth knowing later: whoever joins late and asks for it (transient local) gets all of it.
+HISTORY = Qos(durability="transient_local")
 LATCHED = Qos(durability="transient_local", history="keep_last", depth=1)
 CLOCK = Qos(history="keep_last", depth=100)
 STATUS = Qos(history="keep_last", depth=10)
@@ -100,7 +102,7 @@ def ground_truth_odom(robot: str) -> Topic:
 
 def ground_truth_pose(robot: str) -> Topic:
     """True pose of base_link at rest, for viewers."""
-    return Topic(f"ground_truth/{robot}/pose", "geometry_msgs/msg/PoseStamped")
+    return Topic(f"ground_truth/{robot}/pose", "geometry_msgs/msg/PoseStamped", HISTORY)
 
 
 def ground_truth_path(robot: str) -> Topic:
@@ -110,18 +112,18 @@ def ground_truth_path(robot: str) -> Topic:
 
 def formation_done(robot: str, formation: str = FORMATION, *, listeners: int = 1) -> Topic:
     """The bare tick of a robot: the number of the timestep that it has finished."""
-    return Topic(f"{formation}/{robot}/done", "std_msgs/msg/UInt32", listeners=listeners)
+    return Topic(f"{formation}/{robot}/done", "std_msgs/msg/UInt32", HISTORY, listeners)
 
 
 SURFACE = Topic("surface", "visualization_msgs/msg/Marker", LATCHED)
 CLOCK_TOPIC = Topic("/clock", "rosgraph_msgs/msg/Clock", CLOCK)
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", STATUS)
 MOVE = Topic("move", "geometry_msgs/msg/PoseStamped", listeners=1)
-MOVED = Topic("moved", "geometry_msgs/msg/PoseWithCovarianceStamped", listeners=1)
+MOVED = Topic("moved", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
 ODOM = Topic("odom", "nav_msgs/msg/Odometry")
 BLOCKS = Topic("blocks", "sensor_msgs/msg/PointCloud2", listeners=1)
 BLOCKS_IMAGE = Topic("blocks/image", "sensor_msgs/msg/Image")
-DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStamped", listeners=1)
-RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", listeners=1)
-PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", listeners=1)
-ALIGNMENT = Topic("alignment", "std_msgs/msg/String")
+DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
+RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
+PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
+ALIGNMENT = Topic("alignment", "std_msgs/msg/String", HISTORY)

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from synthetic_bag import Step, SyntheticRun
 
 from robot_formation.analysis.errors import AnalysisError
-from robot_formation.analysis.from_bag import METADATA_RECORD, load_run
+from robot_formation.analysis.from_bag import load_run
+from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.analysis.quantities import analyse, corrections_of, formation_error_uv_m
 from robot_formation.analysis.record import FollowerRecord, RunRecord, Stamped, Track
 from robot_formation.analysis.report import to_json
@@ -54,7 +55,7 @@ STEPS = [
 def write_run(path, steps, *, followers=1, details=None, lost=(), surface=True, missing=()):
     with BagWriter(path) as writer:
         if details is not None:
-            writer.write_metadata(METADATA_RECORD, details)
+            writer.write_metadata(METADATA_NAME, details)
         run = SyntheticRun(writer, followers, surface=surface)
         for step in steps:
             run.step(step)
@@ -261,9 +262,9 @@ def test_the_ground_comes_from_the_surface_marker(tmp_path):
 
 def test_later_metadata_records_add_to_earlier_ones(tmp_path):
     with BagWriter(tmp_path / "run") as writer:
-        writer.write_metadata(METADATA_RECORD, {"scenario": "track one", "seed": "3"})
+        writer.write_metadata(METADATA_NAME, {"scenario": "track one", "seed": "3"})
         SyntheticRun(writer)
-        writer.write_metadata(METADATA_RECORD, {"outcome": "lost"})
+        writer.write_metadata(METADATA_NAME, {"outcome": "lost"})
     record = load_run(tmp_path / "run")
     assert record.details == {"scenario": "track one", "seed": "3", "outcome": "lost"}
     assert analyse(record).outcome == "lost"

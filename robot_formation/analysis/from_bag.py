@@ -15,10 +15,8 @@ from robot_formation import names
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.record import FollowerRecord, Ground, RunRecord, Stamped, Track
 from robot_formation.bag.reader import Bag, read_bag
+from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.control.motion import Motion
-
-METADATA_RECORD = "robot_formation"
-"""MCAP metadata record in which a run says what it is (scenario, seed, predictor, surface, timesteps, ...)."""
 
 _TRIANGLE_LIST = 11
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
@@ -54,9 +52,16 @@ def run_record(bag: Bag) -> RunRecord:
         leader_moved=_stamped(messages[f"/{names.LEADER}/{names.MOVED.name}"]),
         followers=tuple(_follower(robot, messages) for robot in robots if robot != names.LEADER),
         tracks={robot: track for robot, track in tracks.items() if track is not None},
-        simulated_s=bag.duration_s,
-        details=bag.metadata(METADATA_RECORD),
+        simulated_s=_last_stamp_ns(messages) / 1e9,
+        details=bag.metadata(METADATA_NAME),
         ground=_ground(markers[-1]) if markers else None,
+    )
+
+
+def _last_stamp_ns(messages: dict[str, list[Any]]) -> int:
+    """Return the latest simulated time that a message tells (log times may count on by nanoseconds)."""
+    return max(
+        (_stamp_ns(group[-1]) for group in messages.values() if group and hasattr(group[-1], "header")), default=0
     )
 
 
@@ -93,8 +98,12 @@ def _follower(robot: str, messages: dict[str, list[Any]]) -> FollowerRecord:
 
 
 def _stamped(messages: Sequence[Any]) -> tuple[Stamped, ...]:
-    """Turn PoseWithCovarianceStamped messages into stamped displacements."""
-    return tuple(Stamped(_stamp_ns(message), _motion(message.pose.pose)) for message in messages)
+    """Turn PoseWithCovarianceStamped messages into stamped displacements; NaN where a negative variance says 'none'."""
+    none = Motion(math.nan, math.nan)
+    return tuple(
+        Stamped(_stamp_ns(message), _motion(message.pose.pose) if message.pose.covariance[0] >= 0.0 else none)
+        for message in messages
+    )
 
 
 def _stamp_ns(message: Any) -> int:

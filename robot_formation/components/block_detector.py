@@ -82,5 +82,7 @@ class BlockDetectorComponent(Component):
                 opposite = (block.x + block.width // 2, block.y + block.height // 2)
                 cv2.rectangle(picture, corner, opposite, (255, 255, 255), 1)
                 label = f"{block.signature}:{block.index}"
-                cv2.putText(picture, label, (corner[0], corner[1] - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1)
+                cv2.putText(
+                    picture, label, (corner[0], corner[1] - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1
+                )
             self._send(names.BLOCKS_IMAGE, conversions.image(picture, frame, self.stamp_ns))

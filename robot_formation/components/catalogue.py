@@ -27,7 +27,9 @@ class NodeKind:
     def robots_of(self, followers: int) -> list[str]:
         """List the robots that have this node; [''] for a node of the run's own."""
         follower_names = [f"follower_{n}" for n in range(1, followers + 1)]
-        return {"": [""], "all": ["leader", *follower_names], "leader": ["leader"], "followers": follower_names}[self.robots]
+        return {"": [""], "all": ["leader", *follower_names], "leader": ["leader"], "followers": follower_names}[
+            self.robots
+        ]
 
 
 def _import(path: str) -> Any:

@@ -20,7 +20,10 @@ class FineTunerNodeParameters(core.FineTunerParameters):
     """The fine-tuner's parameters and who listens to its tick."""
 
     done_listeners: int = parameter(
-        1, "Nodes that wait for this follower's tick: the leader, and the follower behind if there is one", low=0, high=10
+        1,
+        "Nodes that wait for this follower's tick: the leader, and the follower behind if there is one",
+        low=0,
+        high=10,
     )
 
 
@@ -85,7 +88,10 @@ class FineTunerComponent(Component):
                 case core.Warn(text):
                     self.warn(text)
                 case core.Lost():
-                    self.finish(LOST_EXIT_CODE, f"{self.place.robot} lost its beacon neighbour in timestep {self._tuner.timestep}")
+                    self.finish(
+                        LOST_EXIT_CODE,
+                        f"{self.place.robot} lost its beacon neighbour in timestep {self._tuner.timestep}",
+                    )
 
     def _report(self, displacement: Motion, residual: Motion | None) -> None:
         self._send(names.DISPLACEMENT, conversions.displacement(displacement, self._base, self.stamp_ns))

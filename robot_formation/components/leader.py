@@ -23,7 +23,8 @@ class LeaderComponent(Component):
     def inputs(self) -> list[Input]:
         """See `Component`."""
         ticks = [
-            Input(names.formation_done(name, self.place.formation), partial(self._on_done, name)) for name in self._followers
+            Input(names.formation_done(name, self.place.formation), partial(self._on_done, name))
+            for name in self._followers
         ]
         return [Input(names.MOVED, self._on_moved), *ticks]
 

@@ -36,7 +36,11 @@ class PredictorComponent(Component):
         """See `Component`."""
         insight = self._predictor.insight()
         values = {"predictor": self._predictor.name, "timesteps": str(self._predictor.observations)}
-        for name, array in (("K", insight.k), ("eigenvalues", insight.eigenvalues), ("innovation [m]", insight.innovation)):
+        for name, array in (
+            ("K", insight.k),
+            ("eigenvalues", insight.eigenvalues),
+            ("innovation [m]", insight.innovation),
+        ):
             if array is not None:
                 values[name] = np.array2string(array, precision=6, separator=", ").replace("\n", "")
         if insight.condition_number is not None:

@@ -41,7 +41,9 @@ class WorldNodeParameters(WorldParameters):
         super().__post_init__()
         lengths = {len(self.start_x_m), len(self.start_y_m), len(self.start_heading_rad), len(self.robots)}
         if len(lengths) != 1 or len(set(self.robots)) != len(self.robots):
-            raise ParameterError("world: 'robots' must differ and have one start_x_m, start_y_m and start_heading_rad each")
+            raise ParameterError(
+                "world: 'robots' must differ and have one start_x_m, start_y_m and start_heading_rad each"
+            )
 
     def starts(self) -> list[RobotStart]:
         """List the robots with their start poses."""
@@ -65,7 +67,9 @@ def surface_values(texts: tuple[str, ...]) -> Mapping[str, float]:
         try:
             values[name] = float(value)
         except ValueError:
-            raise ParameterError(f"world: 'surface_parameters' must hold texts like 'height_m=0.1', not {text!r}") from None
+            raise ParameterError(
+                f"world: 'surface_parameters' must hold texts like 'height_m=0.1', not {text!r}"
+            ) from None
     return values
 
 
@@ -86,7 +90,9 @@ class WorldComponent(Component):
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
-        commands = [Input(names.joint_commands(name), partial(self._on_command, name)) for name in self._parameters.robots]
+        commands = [
+            Input(names.joint_commands(name), partial(self._on_command, name)) for name in self._parameters.robots
+        ]
         requests = [Input(names.camera_request(name), partial(self._on_request, name)) for name in self._cameras]
         return commands + requests
 
@@ -94,7 +100,12 @@ class WorldComponent(Component):
         """See `Component`."""
         topics = [names.CLOCK_TOPIC, names.SURFACE]
         for name in self._parameters.robots:
-            topics += [self._joint_states[name], self._odom[name], names.ground_truth_pose(name), names.ground_truth_path(name)]
+            topics += [
+                self._joint_states[name],
+                self._odom[name],
+                names.ground_truth_pose(name),
+                names.ground_truth_path(name),
+            ]
         for name in self._cameras:
             topics += [self._images[name], names.camera_info(name)]
         return topics

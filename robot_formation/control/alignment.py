@@ -23,28 +23,40 @@ TARGET, FRONT, REAR = 1, 2, 3
 class AlignmentParameters:
     """Camera calibration, tolerances and steps of the paper's fine-tuning."""
 
-    target_x_px: float = parameter(157.0, "Column of the Target block in formation", unit="px", low=0.0, high=315.0)
+    target_x_px: float = parameter(158.5, "Column of the Target block in formation", unit="px", low=0.0, high=315.0)
     slope_px_per_m: float = parameter(
-        834.0, "Pan curve: columns per metre along v at the formation distance", unit="px/m", low=1.0, high=1e5
+        836.0, "Pan curve: columns per metre along v at the formation distance", unit="px/m", low=1.0, high=1e5
     )
     side_px_m: float = parameter(
-        16.4, "Side-length curve: side length times distance (focal length times marker size)", unit="px m", low=0.1, high=1e4
+        16.64,
+        "Side-length curve: side length times distance (focal length times marker size)",
+        unit="px m",
+        low=0.1,
+        high=1e4,
     )
     side_bias_px: float = parameter(
-        0.0, "What the detector reports less than the true side length", unit="px", low=-20.0, high=20.0
+        1.73, "What the detector reports less than the true side length", unit="px", low=-20.0, high=20.0
     )
-    distance_m: float = parameter(0.328, "Distance from lens to Target face in formation", unit="m", low=0.01, high=10.0)
+    distance_m: float = parameter(
+        0.328, "Distance from lens to Target face in formation", unit="m", low=0.01, high=10.0
+    )
     v_tolerance_px: float = parameter(5.0, "Tolerance of the column (paper: 5 px)", unit="px", low=0.0, high=100.0)
     u_tolerance_m: float = parameter(0.015, "Tolerance along u (paper: 1.5 cm)", unit="m", low=0.0, high=1.0)
     side_tolerance_px: float = parameter(
-        4.0, "Tolerated difference of the side lengths, which tells the heading (paper: 4 px)", unit="px", low=0.0, high=100.0
+        4.0,
+        "Tolerated difference of the side lengths, which tells the heading (paper: 4 px)",
+        unit="px",
+        low=0.0,
+        high=100.0,
     )
     coarse_step_m: float = parameter(0.05, "Step outside the Target area", unit="m", low=0.001, high=0.1)
     fine_step_m: float = parameter(0.02, "Step at the Target area's edge", unit="m", low=0.001, high=0.1)
     turn_step_rad: float = parameter(math.radians(5.0), "Step in heading", unit="rad", low=0.001, high=1.0)
     max_v_step_m: float = parameter(0.1, "Longest single correction along v", unit="m", low=0.001, high=0.2)
     max_u_step_m: float = parameter(0.1, "Longest single correction along u", unit="m", low=0.001, high=0.1)
-    max_moves: int = parameter(14, "Corrections per timestep after which the follower goes on unaligned", low=1, high=1000)
+    max_moves: int = parameter(
+        14, "Corrections per timestep after which the follower goes on unaligned", low=1, high=1000
+    )
     max_empty_looks: int = parameter(3, "Looks without a block after which the leader is lost", low=1, high=1000)
 
 
@@ -108,7 +120,10 @@ def hulls(blocks: Iterable[Block]) -> dict[int, Box]:
         known = boxes.get(block.signature)
         if known is not None:
             box = Box(
-                min(known.left, box.left), max(known.right, box.right), min(known.top, box.top), max(known.bottom, box.bottom)
+                min(known.left, box.left),
+                max(known.right, box.right),
+                min(known.top, box.top),
+                max(known.bottom, box.bottom),
             )
         boxes[block.signature] = box
     return boxes

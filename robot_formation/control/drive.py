@@ -30,9 +30,9 @@ class CalibrationParameters:
     A negative constant term is what the robot coasts after its motors were switched off.
     """
 
-    v: tuple[float, ...] = parameter((0.0, 33.3), "Curve along v: rad, rad/m, rad/m^2, ...")
-    u: tuple[float, ...] = parameter((0.0, 33.3), "Curve along u: rad, rad/m, rad/m^2, ...")
-    turn: tuple[float, ...] = parameter((0.0, 7.0), "Curve of turns: rad, rad/rad, rad/rad^2, ...")
+    v: tuple[float, ...] = parameter((-0.084, 33.3257), "Curve along v: rad, rad/m, rad/m^2, ...")
+    u: tuple[float, ...] = parameter((-0.074, 33.4589), "Curve along u: rad, rad/m, rad/m^2, ...")
+    turn: tuple[float, ...] = parameter((-0.0657, 6.8361), "Curve of turns: rad, rad/rad, rad/rad^2, ...")
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,13 @@ class DriveParameters:
     max_turn_rad: float = parameter(1.1, "Calibrated range of turns", unit="rad", low=0.0, high=6.3)
     wheel_speed_rad_s: float = parameter(4.0, "Speed limit sent with every rotation", unit="rad/s", low=0.1, high=100.0)
     wheel_radius_m: float = parameter(0.03, "Nominal radius of the drive wheels", unit="m", low=0.001, high=1.0)
-    wheel_lever_m: float = parameter(0.2, "Half wheelbase plus half track", unit="m", low=0.001, high=10.0)
+    wheel_lever_m: float = parameter(0.205, "Half wheelbase plus half track", unit="m", low=0.001, high=10.0)
     encoder_radius_m: float = parameter(0.019, "Radius of the encoder wheels", unit="m", low=0.001, high=1.0)
     encoder_v_offset_m: float = parameter(-0.03, "y of the v encoder wheel in base_link", unit="m", low=-1.0, high=1.0)
     encoder_u_offset_m: float = parameter(-0.05, "x of the u encoder wheel in base_link", unit="m", low=-1.0, high=1.0)
-    move_timeout_s: float = parameter(20.0, "Simulated time after which a leg is stopped", unit="s", low=0.1, high=600.0)
+    move_timeout_s: float = parameter(
+        20.0, "Simulated time after which a leg is stopped", unit="s", low=0.1, high=600.0
+    )
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,9 @@ class Drive:
             return DriveAction()
         self._legs.clear()
         self._stopping = True
-        return DriveAction(command=self._hold(), warning=f"a leg took longer than {timeout_s} s: stopped; is the robot blocked?")
+        return DriveAction(
+            command=self._hold(), warning=f"a leg took longer than {timeout_s} s: stopped; is the robot blocked?"
+        )
 
     def _refusal(self, target: Motion) -> str:
         p = self._parameters
@@ -160,7 +164,11 @@ class Drive:
         forward = cosine * target.x_m + sine * target.y_m
         left = cosine * target.y_m - sine * target.x_m
         legs = []
-        for axis, amount, curve in (("yaw", target.yaw_rad, curves.turn), ("x", forward, curves.v), ("y", left, curves.u)):
+        for axis, amount, curve in (
+            ("yaw", target.yaw_rad, curves.turn),
+            ("x", forward, curves.v),
+            ("y", left, curves.u),
+        ):
             angle = sum(c * abs(amount) ** power for power, c in enumerate(curve)) if amount else 0.0
             if angle > 0.0:  # a leg shorter than the robot's coasting can't be driven
                 angles = tuple(math.copysign(angle, amount) * sign for sign in _SIGNS[axis])

@@ -36,8 +36,12 @@ class FineTunerParameters:
     first_step_m: float = parameter(
         0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
     )
-    max_v_m: float = parameter(0.2, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=10.0)
-    max_u_m: float = parameter(0.1, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=10.0)
+    max_v_m: float = parameter(
+        0.2, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=10.0
+    )
+    max_u_m: float = parameter(
+        0.1, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=10.0
+    )
     look: LookParameters = LookParameters()
     alignment: AlignmentParameters = AlignmentParameters()
 
@@ -136,7 +140,10 @@ class FineTuner:
         if self._phase is not Phase.MOVE:
             return [Warn("a 'moved' that nobody asked for is ignored")]
         if not motion.finite:
-            return [Warn("a 'moved' that is not finite is ignored: the displacement of this move is lost"), *self._look()]
+            return [
+                Warn("a 'moved' that is not finite is ignored: the displacement of this move is lost"),
+                *self._look(),
+            ]
         self.stamp_ns = stamp_ns
         self._displacement = self._displacement.then(motion)
         return self._look()
@@ -182,7 +189,9 @@ class FineTuner:
         collecting = self.timestep <= COLLECTION_TIMESTEPS
         actions: list[Action] = [State("collect" if collecting else "predict"), SendMove(motion)]
         if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
-            actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is beyond the calibrated range: cut"))
+            actions.insert(
+                0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is beyond the calibrated range: cut")
+            )
         return actions
 
     def _planned(self) -> Motion:

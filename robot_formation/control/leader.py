@@ -18,7 +18,9 @@ class LeaderParameters:
     """What the leader does."""
 
     timesteps: int = parameter(20, "Number of timesteps to drive", low=1, high=100000)
-    step_m: float = parameter(0.05, "Forward displacement asked of the drive per timestep", unit="m", low=0.001, high=0.2)
+    step_m: float = parameter(
+        0.05, "Forward displacement asked of the drive per timestep", unit="m", low=0.001, high=0.2
+    )
     followers: tuple[str, ...] = parameter(("follower_1",), "Robots whose done ticks are waited for")
 
 

@@ -5,6 +5,7 @@ The components, the messages and their order per topic are those of the node gra
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,7 +18,8 @@ from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.recorder import Recorder
 from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import KINDS, NodeKind
-from robot_formation.experiment.run_result import LOST_EXIT_CODE, RunError
+from robot_formation.experiment.progress import Progress
+from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import Topic
 from robot_formation.parameters import from_mapping
@@ -51,14 +53,18 @@ class InProcessRun:
     def __post_init__(self) -> None:
         self._queue: deque[tuple[str, Topic, Any]] = deque()
         self._handlers: dict[str, list[Handler]] = {}
-        self._hosted = [self._host(kind, robot) for kind in KINDS.values() for robot in kind.robots_of(self.scenario.setup.followers)]
+        self._hosted = [
+            self._host(kind, robot)
+            for kind in KINDS.values()
+            for robot in kind.robots_of(self.scenario.setup.followers)
+        ]
         for hosted in self._hosted:
             for entry in hosted.component.inputs():
                 name = absolute(hosted.namespace, entry.topic.name)
                 self._handlers.setdefault(name, []).append(entry.handler)
 
-    def run(self) -> int:
-        """Run until a component ends; return its exit code (0 done, 3 lost).
+    def run(self) -> tuple[int, str]:
+        """Run until a component ends; return its exit code (0 done, 3 lost) and its reason unless it was done.
 
         Raises:
             RunError: if everybody waits for somebody, which no run should come to.
@@ -68,9 +74,10 @@ class InProcessRun:
         world = self._hosted[0].component
         while True:
             self._deliver()
-            codes = [h.component.exit_code for h in self._hosted if h.component.exit_code is not None]
-            if codes:
-                return max(codes)
+            ended = [h.component for h in self._hosted if h.component.exit_code is not None]
+            if ended:
+                code, reason = max((component.exit_code or 0, component.exit_reason) for component in ended)
+                return code, reason if code else ""
             if not world.busy:
                 states = ", ".join(f"{h.namespace}: {dict(h.component.health().values)}" for h in self._hosted)
                 raise RunError(f"the run stands still: everybody waits ({states})")
@@ -115,16 +122,28 @@ def absolute(namespace: str, name: str) -> str:
     return name if name.startswith("/") else f"{namespace}/{name}"
 
 
-def run_in_process(scenario: Scenario, bag: Path | None, metadata: dict[str, str], *, images: bool = False) -> tuple[int, list[str]]:
-    """Run a scenario and record it if a path is given; return the exit code and the warnings."""
+def run_in_process(
+    scenario: Scenario,
+    bag: Path | None,
+    metadata: dict[str, str],
+    *,
+    images: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+) -> RunResult:
+    """Run a scenario, record it if a path is given, and tell its progress to `say`.
+
+    Raises:
+        BagError: if the bag's path is taken or can't be written.
+        RunError: if everybody waits for somebody.
+    """
+    began = time.monotonic()
+    timesteps = scenario.parameters("leader")["timesteps"]
+    progress = Progress(scenario.setup.followers, timesteps, say, lambda: time.monotonic() - began)
     recorder = Recorder(bag, metadata) if bag is not None else None
     try:
-        run = InProcessRun(scenario, recorder, images)
-        code = run.run()
+        run = InProcessRun(scenario, recorder, images, progress.listen)
+        code, reason = run.run()
     finally:
         if recorder is not None:
             recorder.close()
-    return code, run.warnings
-
-
-__all__ = ["LOST_EXIT_CODE", "InProcessRun", "absolute", "run_in_process"]
+    return RunResult(code, bag, reason, run.warnings, running_s=time.monotonic() - began)

@@ -14,7 +14,9 @@ from robot_formation.experiment.scenario import FORMATION_DISTANCE_M
 class Progress:
     """Follows the messages of a run. Feed it absolute topic names with their messages, in the order they come."""
 
-    def __init__(self, followers: int, timesteps: int, say: Callable[[str], None], elapsed: Callable[[], float]) -> None:
+    def __init__(
+        self, followers: int, timesteps: int, say: Callable[[str], None], elapsed: Callable[[], float]
+    ) -> None:
         self._timesteps = timesteps
         self._say = say
         self._elapsed = elapsed

@@ -126,7 +126,9 @@ def load(path: Path) -> Scenario:
     """
     content = read_yaml(path)
     if not isinstance(content, Mapping):
-        raise ScenarioError(f"{path}: a scenario is a mapping with entries like 'seed' and 'leader'; see config/scenarios")
+        raise ScenarioError(
+            f"{path}: a scenario is a mapping with entries like 'seed' and 'leader'; see config/scenarios"
+        )
     known = [*specs(Setup), *KINDS]
     for key in content:
         if key not in known:
@@ -171,7 +173,9 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     kind, dot, name = key.partition(".")
     if not dot:
         if key not in specs(Setup):
-            raise ParameterError(f"--set: no entry '{key}'{suggestion(key, [*specs(Setup), *(f'{k}.' for k in KINDS)])}")
+            raise ParameterError(
+                f"--set: no entry '{key}'{suggestion(key, [*specs(Setup), *(f'{k}.' for k in KINDS)])}"
+            )
         values = {**to_mapping(scenario.setup), key: value}
         return replace(scenario, setup=from_mapping(Setup, values, where="--set"))
     if kind not in KINDS:

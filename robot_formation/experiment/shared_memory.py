@@ -21,6 +21,24 @@ SHARED_MEMORY = Path("/dev/shm")
 _NAME = re.compile(r"(?:sem\.)?(?P<group>fastrtps_(?:[0-9a-f]{16}|port(?P<port>\d+)))(?P<part>_el|_sl|_mutex)?")
 
 
+class TracingFiles:
+    """Notes LTTng's wake-up files at a time before ROS is loaded, so that those made since can be removed.
+
+    ROS's tracing library makes `lttng-ust-wait-*` as soon as it is loaded and never removes it; the next program that
+    traces makes it anew.
+    """
+
+    def __init__(self, folder: Path = SHARED_MEMORY) -> None:
+        self._folder = folder
+        self._before = set(folder.glob("lttng-ust-wait-*"))
+
+    def remove_new(self) -> None:
+        """Remove what was made since."""
+        for path in set(self._folder.glob("lttng-ust-wait-*")) - self._before:
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
 def fast_dds_files(folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
     """List Fast DDS' files by the segment or port that they belong to; empty where the folder can't be read."""
     groups: dict[str, list[str]] = {}

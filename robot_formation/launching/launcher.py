@@ -76,8 +76,8 @@ class Launcher:
             result = RunResult(NODE_DIED_EXIT_CODE, self.bag)
             began = time.monotonic()
             try:
-                self._start(folder, domain)
-                result.exit_code, result.reason = self._watch(domain, result, began)
+                environment = node_environment(domain, folder)
+                result.exit_code, result.reason = self._drive(folder, environment, result)
             finally:
                 self._stop()
                 result.running_s = time.monotonic() - began - result.startup_s
@@ -93,24 +93,26 @@ class Launcher:
             if path.exists():
                 raise RunError(f"{path} exists already and is not overwritten; choose another path with --bag")
 
-    def _start(self, folder: Path, domain: int) -> None:
-        environment = node_environment(domain, folder)
+    def _start(self, folder: Path, environment: dict[str, str]) -> None:
         for process in processes(self.scenario, self.bag, images=self.images):
             if self.callback_delay_s and process.executable != RECORDER:
                 delay = {"callback_delay_s": self.callback_delay_s}
                 process = type(process)(process.executable, process.namespace, {**process.parameters, **delay})
             self._children.append(Child(process, folder, environment))
         if self.on_start is not None:
-            self.on_start(domain, {child.name: child._popen.pid for child in self._children})
+            self.on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child._popen.pid for child in self._children})
 
-    def _watch(self, domain: int, result: RunResult, began: float) -> tuple[int, str]:
-        """Follow the run until something ends it; return the exit code and why."""
+    def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
+        """Start the nodes and follow the run until something ends it; return the exit code and why."""
         from robot_formation.nodes.monitor import Monitor  # here, since it needs the environment of the wheels
 
+        began = time.monotonic()
         setup, timesteps = self.scenario.setup, self.scenario.parameters("leader")["timesteps"]
         progress = Progress(setup.followers, timesteps, self.say, lambda: time.monotonic() - began)
-        last, heard = time.monotonic(), 0
-        with Monitor(domain, progress.topics, progress.listen) as monitor:
+        # The monitor joins first: the nodes then know of it before they send anything.
+        with Monitor(environment, progress.topics, progress.listen) as monitor:
+            self._start(folder, environment)
+            last, heard = time.monotonic(), 0
             while True:
                 monitor.spin(_POLL_S)
                 now = time.monotonic()

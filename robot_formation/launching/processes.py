@@ -44,10 +44,18 @@ def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, pat
         images: whether pictures are recorded too.
         patience_s: how long a node waits for its listeners.
     """
-    host = {"wait_for_listeners_s": patience_s, "recorder": RECORDER if bag else "", "record_images": images and bool(bag)}
+    host = {
+        "wait_for_listeners_s": patience_s,
+        "recorder": RECORDER if bag else "",
+        "record_images": images and bool(bag),
+    }
     found = []
     if bag is not None:
-        parameters = {"path": str(bag), "images": images, "metadata": [f"{k}={v}" for k, v in run_metadata(scenario).items()]}
+        parameters = {
+            "path": str(bag),
+            "images": images,
+            "metadata": [f"{k}={v}" for k, v in run_metadata(scenario).items()],
+        }
         found.append(Process(RECORDER, "/", parameters))
     for kind in KINDS.values():
         for robot in kind.robots_of(scenario.setup.followers):

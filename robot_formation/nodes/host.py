@@ -9,12 +9,13 @@ import signal
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import rclpy
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
@@ -24,6 +25,7 @@ from robot_formation import conversions, names
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
+from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.outbox import IMAGE_TYPE, Outbox
 from robot_formation.nodes.parameters import HostParameters, declare
 
@@ -102,7 +104,9 @@ class Host:
         parameters, self._parameters = declare(node, entry.parameter_class(), HostParameters)
         robot = node.get_namespace().strip("/").rpartition("/")[2]
         if entry.robots and not robot:
-            raise FormationError(f"{kind} belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1")
+            raise FormationError(
+                f"{kind} belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1"
+            )
         place = Place(robot if entry.robots else "", self._parameters.formation)
         self._real_time_factor = getattr(parameters, "real_time_factor", 0.0)
         self._component: Component = entry.component_class()(parameters, place)
@@ -126,16 +130,20 @@ class Host:
             self._outbox.add(topic, publisher)
         for entry in self._component.inputs():
             topic, handler = entry.topic, self._delayed(entry.handler)
-            node.create_subscription(conversions.message_class(topic.type), topic.name, handler, qos_profile(topic.qos))
+            # Volatile: a node that joins late must not act on what was said before.
+            qos = qos_profile(replace(topic.qos, durability="volatile"))
+            node.create_subscription(conversions.message_class(topic.type), topic.name, handler, qos)
         for name, service in self._component.services().items():
             node.create_service(Trigger, name, self._trigger(service))
         health = names.DIAGNOSTICS
-        self._health = node.create_publisher(conversions.message_class(health.type), health.name, qos_profile(health.qos))
+        self._health = node.create_publisher(
+            conversions.message_class(health.type), health.name, qos_profile(health.qos)
+        )
         node.create_timer(_DIAGNOSTICS_S, self._publish_health)
 
     def run(self) -> int:
         """Spin until the component finishes or a signal comes; then make sure that everything sent has arrived."""
-        executor = SingleThreadedExecutor()
+        executor = make_executor()
         executor.add_node(self._node)
         component, outbox = self._component, self._outbox
         component.start()
@@ -209,5 +217,3 @@ class Pacer:
         due = max(now, (self._wall_s or now) + step_s)
         self._wall_s = due
         time.sleep(max(0.0, due - now))
-
-

@@ -2,32 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import os
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import TracebackType
 from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from robot_formation import conversions, names
+from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import qos_profile
 
 # Nodes whose names begin with an underscore are hidden: nobody waits for them, and lists leave them out.
 _NAME = "_monitor"
+# What a process must have in common with the run's nodes to find them at once, and where rclpy writes its log.
+_JOINING = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOG_DIR")
+
+
+@contextlib.contextmanager
+def _variables(values: Mapping[str, str]) -> Iterator[None]:
+    """Set environment variables for a while: rclpy reads its settings from nowhere else."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
 
 
 class Monitor:
     """Listens to topics of a domain; a context manager. `spin` takes what has arrived."""
 
-    def __init__(self, domain: int, topics: list[str], listen: Callable[[str, Any], None]) -> None:
+    def __init__(self, environment: Mapping[str, str], topics: list[str], listen: Callable[[str, Any], None]) -> None:
+        """Join the graph.
+
+        Args:
+            environment: that of the run's nodes; its domain, discovery range and log folder count.
+            topics: absolute names of topics that the run's nodes have.
+            listen: called with topic and message.
+        """
         self._context = Context()
-        rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        with _variables({name: environment[name] for name in _JOINING}):
+            domain = int(environment["ROS_DOMAIN_ID"])
+            rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
         self._node = Node(_NAME, context=self._context, start_parameter_services=False, enable_rosout=False)
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor = make_executor(self._context)
         self._executor.add_node(self._node)
         self._listen = listen
         self.messages = 0
@@ -48,7 +76,9 @@ class Monitor:
     def __enter__(self) -> Monitor:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._executor.shutdown()
         self._node.destroy_node()
         rclpy.shutdown(context=self._context)

@@ -39,7 +39,11 @@ class HostParameters:
     recorder: str = parameter("", "Name of a recorder that must listen too before anything is sent; empty: none")
     record_images: bool = parameter(False, "Whether that recorder records images")
     callback_delay_s: float = parameter(
-        0.0, "Longest random delay before each callback, to show that results don't depend on it", unit="s", low=0.0, high=10.0
+        0.0,
+        "Longest random delay before each callback, to show that results don't depend on it",
+        unit="s",
+        low=0.0,
+        high=10.0,
     )
 
 
@@ -64,7 +68,9 @@ def declare(node: Node, *classes: type) -> list[Any]:
     for name, spec in known.items():
         default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
         override = values.get(name, default)
-        node.declare_parameter(name, Parameter(name, _TYPES[spec.type], override).value, _descriptor(spec), ignore_override=True)
+        node.declare_parameter(
+            name, Parameter(name, _TYPES[spec.type], override).value, _descriptor(spec), ignore_override=True
+        )
     return objects
 
 
@@ -86,10 +92,14 @@ def _descriptor(spec: Spec) -> ParameterDescriptor:
     if low is not None or high is not None:
         if spec.type is int:
             descriptor.integer_range = [
-                IntegerRange(from_value=int(-(2**62) if low is None else low), to_value=int(2**62 if high is None else high))
+                IntegerRange(
+                    from_value=int(-(2**62) if low is None else low), to_value=int(2**62 if high is None else high)
+                )
             ]
         elif spec.type is float:
             descriptor.floating_point_range = [
-                FloatingPointRange(from_value=-_LARGE if low is None else float(low), to_value=_LARGE if high is None else float(high))
+                FloatingPointRange(
+                    from_value=-_LARGE if low is None else float(low), to_value=_LARGE if high is None else float(high)
+                )
             ]
     return descriptor

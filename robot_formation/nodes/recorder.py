@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -19,6 +19,7 @@ from robot_formation import conversions
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.recorder import Recorder
+from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import run_node, stopped
 from robot_formation.nodes.outbox import IMAGE_TYPE
 from robot_formation.nodes.parameters import HostParameters, declare
@@ -37,7 +38,8 @@ class RecorderParameters:
 
     path: str = parameter("", "Folder of the bag; it must not exist")
     exclude: str = parameter(
-        "/parameter_events|/rosout|.*/transition_event", "Regular expression of topics that are left out, matched as a whole"
+        "/parameter_events|/rosout|.*/transition_event",
+        "Regular expression of topics that are left out, matched as a whole",
     )
     images: bool = parameter(False, "Record pictures too: noisy frames are 126 MB per thousand")
     metadata: tuple[str, ...] = parameter((), "Texts 'key=value' for the bag's metadata record")
@@ -63,7 +65,7 @@ class RecorderNode:
 
     def run(self) -> int:
         """Record until a signal comes; then take what is still on its way and close the bag."""
-        executor = SingleThreadedExecutor()
+        executor = make_executor()
         executor.add_node(self._node)
         timer = self._node.create_timer(_DISCOVERY_S, self._discover)
         try:
@@ -89,7 +91,7 @@ class RecorderNode:
             self._tick_at = None
             self._recorder.end_chunk()
 
-    def _drain(self, executor: SingleThreadedExecutor) -> None:
+    def _drain(self, executor: Executor) -> None:
         end = time.monotonic() + _LONGEST_DRAIN_S
         last = time.monotonic()
         while time.monotonic() < min(end, last + _SILENCE_S):

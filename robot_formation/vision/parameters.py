@@ -64,9 +64,7 @@ class DetectorParameters:
     def __post_init__(self) -> None:
         """Refuse more ranges than there are signatures."""
         if len(self.signature_range) > SIGNATURES:
-            raise ParameterError(
-                f"'signature_range' has {len(self.signature_range)} values; give at most {SIGNATURES}"
-            )
+            raise ParameterError(f"'signature_range' has {len(self.signature_range)} values; give at most {SIGNATURES}")
 
     def range_of(self, signature: int) -> float:
         """Range of signature 1..7; the camera's default where the list is shorter."""

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from robot_formation.errors import FormationError
+
 WIDTH = 316
 """Columns of the reported frame, pixels."""
 HEIGHT = 208
@@ -17,7 +19,7 @@ CELLS = WIDTH // 2
 Picture = npt.NDArray[np.uint8]
 
 
-class PictureError(ValueError):
+class PictureError(FormationError):
     """A picture has the wrong shape or type; the text says what is expected."""
 
 

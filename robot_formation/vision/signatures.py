@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from robot_formation.errors import FormationError
 from robot_formation.vision.parameters import SIGNATURES
 from robot_formation.vision.picture import HEIGHT, WIDTH, checked
 from robot_formation.vision.teaching import BLOCK, IntArray, Point, TeachFrame, bounds, grow, packed
@@ -31,7 +32,7 @@ _OPTIONAL = {"rgb", "type"}
 _BOUND = 2**31
 
 
-class SignatureError(ValueError):
+class SignatureError(FormationError):
     """A signature, a region to teach or a file of signatures can't be used; the text says why and what to do."""
 
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from robot_formation.errors import FormationError
 from robot_formation.vision.block import Block
 from robot_formation.vision.boxes import Box
 
@@ -19,7 +20,7 @@ _OLDEST = 255
 _INDICES = 256
 
 
-class ClockError(ValueError):
+class ClockError(FormationError):
     """A frame is not later than the one before it."""
 
 

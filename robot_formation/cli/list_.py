@@ -1,0 +1,63 @@
+"""`formation list`: what can be named on the command line."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "list",
+        help="list tracks, surfaces, predictors and robots",
+        description="List what can be named in other verbs.",
+    )
+    parser.add_argument("what", nargs="?", choices=("tracks", "surfaces", "predictors", "robots"), help="only these")
+    parser.add_argument("--json", action="store_true", help="machine-readable, on standard output")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the lists."""
+    found = collect()
+    if args.what:
+        found = {args.what: found[args.what]}
+    if args.json:
+        print(json.dumps(found, indent=2))
+        return 0
+    for kind, entries in found.items():
+        print(kind)
+        for name, text in entries.items():
+            print(f"  {name:<20} {text}")
+    return 0
+
+
+def collect() -> dict[str, dict[str, str]]:
+    """Collect names and descriptions by kind."""
+    from robot_formation.experiment import scenario
+    from robot_formation.koopman.predictors import MODELS
+    from robot_formation.surface import SURFACES
+
+    tracks = {}
+    for name in scenario.track_names():
+        loaded = scenario.load_track(name)
+        setup, leader = loaded.setup, loaded.parameters("leader")
+        tracks[name] = (
+            f"leader from ({setup.start_x_m * 100:.1f}, {setup.start_y_m * 100:.1f}) cm, heading {setup.heading_deg:g} deg, "
+            f"{leader['timesteps']} timesteps of {leader['step_m'] * 100:g} cm"
+        )
+    return {
+        "tracks": tracks,
+        "surfaces": {name: _first_line(kind) for name, kind in SURFACES.items()},
+        "predictors": {name: _first_line(model) for name, model in MODELS.items()},
+        "robots": {
+            "leader": "drives the track, carries the tri-colour marker",
+            "follower_1": "keeps 32 cm to the right of the leader; --set followers=N adds follower_2 .. follower_N",
+        },
+    }
+
+
+def _first_line(thing: Any) -> str:
+    return (thing.__doc__ or "").strip().splitlines()[0]

@@ -1,0 +1,161 @@
+"""`formation run`: a scenario through the node graph, with progress, bag and analysis."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robot_formation.errors import FormationError
+
+if TYPE_CHECKING:
+    from robot_formation.experiment.run_result import RunResult
+    from robot_formation.experiment.scenario import Scenario
+
+DESCRIPTION = """\
+Run a scenario through the node graph (one process per node), record it into a bag and analyse it. Without arguments:
+track two of the paper with the 'measured' predictor. Progress goes to standard error, the analysis to standard output.
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("run", help="run a scenario, record and analyse it", description=DESCRIPTION)
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--track", metavar="NAME", help="preset track: one, two (default), ... (see 'formation list')")
+    what.add_argument("--scenario", metavar="FILE", type=Path, help="YAML file like those in config/scenarios")
+    parser.add_argument("--predictor", metavar="NAME", help="previous, literal, measured, ... (see 'formation list')")
+    parser.add_argument("--seed", metavar="N", type=int, help="seed of every random stream")
+    parser.add_argument("--surface", metavar="NAME", help="bowl, plane, ... (see 'formation list')")
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="any parameter, like predictor.forgetting=0.95 or followers=2; may be repeated",
+    )
+    parser.add_argument("--bag", metavar="PATH", type=Path, help="folder of the bag (default: a new one in bags/)")
+    parser.add_argument("--images", action="store_true", help="record pictures too (126 MB per thousand)")
+    parser.add_argument(
+        "--real-time-factor", metavar="X", type=float, help="0: as fast as possible (default), 1: real time"
+    )
+    parser.add_argument(
+        "--camera", metavar="MODE", help="stream (every frame, default) or on_demand (requested frames)"
+    )
+    parser.add_argument("--in-process", action="store_true", help="the same run in one process, without ROS middleware")
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON and nothing else on standard output; no pictures"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run, analyse, print; return 0 done, 3 lost, 4 a node died, 130 interrupted.
+
+    Raises:
+        FormationError: on anything wrong in the arguments, before anything is started.
+    """
+    from robot_formation.experiment.shared_memory import TracingFiles
+
+    tracing = TracingFiles()  # before anything of ROS is loaded
+    try:
+        scenario = build_scenario(args)
+        bag = args.bag.absolute() if args.bag is not None else default_bag(scenario)
+        check_free(bag)
+        result = execute(args, scenario, bag)
+    finally:
+        tracing.remove_new()
+    for warning in result.warnings[:20]:
+        print(f"warning: {warning}", file=sys.stderr)
+    if result.reason:
+        print(f"formation run: {result.reason}", file=sys.stderr)
+    if result.bag is not None:
+        report(args, result)
+    return result.exit_code
+
+
+def build_scenario(args: argparse.Namespace) -> Scenario:
+    """Put the scenario together from preset or file and the options.
+
+    Raises:
+        FormationError: naming what is misspelt or out of range.
+    """
+    from robot_formation.experiment import scenario as scenarios
+
+    if args.scenario is not None:
+        scenario = scenarios.load(args.scenario)
+    else:
+        scenario = scenarios.load_track(args.track or "two")
+    if args.surface is not None:
+        scenario = scenarios.with_surface(scenario, args.surface)
+    for key, value in (
+        ("predictor.name", args.predictor),
+        ("seed", args.seed),
+        ("world.camera.mode", args.camera),
+        ("world.real_time_factor", args.real_time_factor),
+    ):
+        if value is not None:
+            scenario = scenarios.with_value(scenario, key, value)
+    scenario = scenarios.override(scenario, args.set)
+    scenario.check()
+    return scenario
+
+
+def default_bag(scenario: Scenario) -> Path:
+    """Name a new bag after the run and the time."""
+    from robot_formation.paths import default_bags_dir
+
+    predictor = scenario.parameters("predictor")["name"]
+    stem = f"{scenario.setup.name}_{predictor}_seed{scenario.setup.seed}_{time.strftime('%Y%m%d-%H%M%S')}"
+    return default_bags_dir() / stem
+
+
+def check_free(bag: Path) -> None:
+    """Refuse a path that is taken.
+
+    Raises:
+        FormationError: naming the path.
+    """
+    from robot_formation.bag.writer import PARTIAL_SUFFIX
+
+    for path in (bag, bag.with_name(bag.name + PARTIAL_SUFFIX)):
+        if path.exists():
+            raise FormationError(f"{path} exists already and is not overwritten; choose another path with --bag")
+
+
+def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResult:
+    """Run the scenario in the way that the options ask for."""
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    if args.in_process:
+        from robot_formation.experiment.in_process import run_in_process
+        from robot_formation.launching.processes import run_metadata
+
+        if scenario.parameters("world")["real_time_factor"] > 0.0:
+            raise FormationError("--in-process runs as fast as it can; leave --real-time-factor out")
+        return run_in_process(scenario, bag, run_metadata(scenario), images=args.images, say=say)
+    from robot_formation.launching.launcher import Launcher
+
+    return Launcher(scenario, bag, images=args.images, say=say).run()
+
+
+def report(args: argparse.Namespace, result: RunResult) -> None:
+    """Print the analysis of the run's bag."""
+    from robot_formation.analysis.from_bag import load_run
+    from robot_formation.analysis.quantities import analyse
+    from robot_formation.analysis.report import text_report, to_json, write_pictures
+
+    assert result.bag is not None  # checked by the caller
+    record = load_run(result.bag)
+    analysis = analyse(record)
+    if args.json:
+        print(to_json(analysis))
+        return
+    print(text_report(record, analysis))
+    folder = result.bag.with_name(f"{result.bag.name}_analysis")
+    pictures = write_pictures(record, analysis, folder)
+    print(f"\nbag: {result.bag}\npictures: " + ", ".join(str(picture) for picture in pictures))

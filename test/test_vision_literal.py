@@ -1,0 +1,52 @@
+"""The fast detector agrees with the slow, literal reading of the rules on random pictures."""
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from vision_helpers import GROUPS, PARAMETERS, random_picture
+from vision_literal import LiteralDetector
+
+from robot_formation.vision.detector import BlockDetector
+from robot_formation.vision.parameters import DetectorParameters
+
+SETTINGS = {
+    "default": DetectorParameters(),
+    "paper": replace(PARAMETERS["paper"], signature_range=(5.0, 6.0, 6.0)),
+    "wide and few": DetectorParameters(
+        signature_range=(15.0, 20.0, 25.0), min_block_area=4, max_merge_dist=0, max_blocks=9, max_blocks_per_signature=4
+    ),
+}
+
+
+@functools.cache
+def pair(name):
+    return BlockDetector(GROUPS["G1"], SETTINGS[name]), LiteralDetector(GROUPS["G1"], SETTINGS[name])
+
+
+def agree(name, seeds):
+    fast, literal = pair(name)
+    for seed in seeds:
+        image = random_picture(np.random.default_rng(seed))
+        assert fast.row_segments(image) == literal.row_segments(image), f"segments, seed {seed}"
+        boxes = [(box.signature, box.left, box.right, box.top, box.bottom) for box in fast.detect(image)]
+        assert boxes == literal.detect(image), f"boxes, seed {seed}"
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_random_pictures_give_the_segments_and_boxes_of_the_literal_reading(name):
+    agree(name, range(25))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SETTINGS)
+def test_many_random_pictures_give_the_segments_and_boxes_of_the_literal_reading(name):
+    agree(name, range(1000, 1334))
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_the_color_table_is_that_of_the_literal_reading(name):
+    fast, literal = pair(name)
+    shifted = [literal.table[64 * ((iu - 32) & 63) + ((iv - 32) & 63)] for iu in range(64) for iv in range(64)]
+    assert fast._table.labels.tolist() == shifted
