@@ -1,6 +1,6 @@
 """ROS messages from the project's values and back. The only module outside nodes/ that knows message packages.
 
-Readers check what comes from outside and raise `MessageError`, one sentence, before anything reaches a model or a wheel.
+Readers check what comes from outside and raise `MessageError` before anything reaches a model or a wheel.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import array
 import importlib
 import math
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,7 +52,7 @@ class MessageError(FormationError):
     """A message can't be used; the text says why."""
 
 
-@lru_cache(maxsize=None)
+@cache
 def message_class(type_name: str) -> Any:
     """Import the class of 'package/msg/Name'."""
     package, _, name = type_name.split("/")
@@ -183,7 +183,7 @@ def read_move(message: PoseStamped) -> Motion:
 def displacement(
     motion: Motion, frame: str, stamp_ns: int, covariance_xy: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
 ) -> PoseWithCovarianceStamped:
-    """Make a displacement with the covariance of (x, y), row by row [m^2]; a negative first element means 'no estimate'."""
+    """Make a displacement with the covariance of (x, y), row by row [m^2]; a negative first one means 'no estimate'."""
     message = PoseWithCovarianceStamped(header=header(stamp_ns, frame))
     _set_planar(message.pose.pose, motion)
     covariance = np.zeros((6, 6))

@@ -1,7 +1,7 @@
 """Every topic, frame and quality of service in one place.
 
-Names are relative: a robot's nodes run in the robot's namespace, the world and the recorder in the run's. What belongs to
-the formation as a whole lies under the namespace given by the parameter `formation` (default `/formation`).
+Names are relative: a robot's nodes run in the robot's namespace, the world and the recorder in the run's. What belongs
+to the formation as a whole lies under the namespace given by the parameter `formation` (default `/formation`).
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ _ELEMENTS: dict[Any, type] = {
 
 
 class ParameterError(FormationError):
-    """A parameter has an unknown name, a wrong type or a value outside its range; the text says which and what to do."""
+    """A parameter has an unknown name, a wrong type or a value outside its range; the text says which."""
 
 
 @dataclass(frozen=True)

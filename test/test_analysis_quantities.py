@@ -11,12 +11,12 @@ from synthetic_bag import Step, SyntheticRun
 
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.from_bag import load_run
-from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.analysis.quantities import analyse, corrections_of, formation_error_uv_m
 from robot_formation.analysis.record import FollowerRecord, RunRecord, Stamped, Track
 from robot_formation.analysis.report import to_json
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.qos import TopicQos
+from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.bag.writer import BagWriter
 from robot_formation.control.motion import Motion
 

@@ -1,4 +1,4 @@
-"""Records a stream of raw messages: finds their simulated time and closes chunks, so that a killed recorder loses little."""
+"""Records a stream of raw messages: finds their simulated time, and ends chunks so that little is lost."""
 
 from __future__ import annotations
 

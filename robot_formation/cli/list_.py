@@ -45,7 +45,8 @@ def collect() -> dict[str, dict[str, str]]:
         loaded = scenario.load_track(name)
         setup, leader = loaded.setup, loaded.parameters("leader")
         tracks[name] = (
-            f"leader from ({setup.start_x_m * 100:.1f}, {setup.start_y_m * 100:.1f}) cm, heading {setup.heading_deg:g} deg, "
+            f"leader from ({setup.start_x_m * 100:.1f}, {setup.start_y_m * 100:.1f}) cm, "
+            f"heading {setup.heading_deg:g} deg, "
             f"{leader['timesteps']} timesteps of {leader['step_m'] * 100:g} cm"
         )
     return {

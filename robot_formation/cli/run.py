@@ -84,10 +84,8 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
     """
     from robot_formation.experiment import scenario as scenarios
 
-    if args.scenario is not None:
-        scenario = scenarios.load(args.scenario)
-    else:
-        scenario = scenarios.load_track(args.track or "two")
+    file = args.scenario
+    scenario = scenarios.load(file) if file is not None else scenarios.load_track(args.track or "two")
     if args.surface is not None:
         scenario = scenarios.with_surface(scenario, args.surface)
     for key, value in (

@@ -1,0 +1,1 @@
+"""The nodes' bodies at the level of messages, without rclpy."""

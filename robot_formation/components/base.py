@@ -61,7 +61,7 @@ class Component:
         self._last_warning = ""
 
     def attach(self, send: Callable[[Topic, Any], None], say: Callable[[int, str], None]) -> None:
-        """Connect the component: `send(topic, message)` publishes, `say(level, text)` logs (0 info, 1 warning, 2 error)."""
+        """Connect: `send(topic, message)` publishes, `say(level, text)` logs (0 info, 1 warning, 2 error)."""
         self._send = send
         self._say = say
 

@@ -16,7 +16,8 @@ from robot_formation.parameters import ParameterError, parameter
 from robot_formation.surface import Surface, make_surface
 from robot_formation.world.events import Event, Frame, JointStates, RobotPose
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.world import RobotStart, World
+from robot_formation.world.robot import RobotStart
+from robot_formation.world.world import World
 
 _MESH_CELLS = 40
 

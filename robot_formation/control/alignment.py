@@ -1,8 +1,8 @@
 """What one look at the marker means: the paper's visual algorithm, as a rule table without input or output.
 
 Paper, "Visual fine-tuning process calibrations": reach the area where only the Target face is seen, then fine-tune the
-position along v by the block's column, then u by its side length. The flow chart of the paper is missing; our reading of
-it is documented in docs/paper.md ("Reading of the paper").
+position along v by the block's column, then u by its side length. The paper's flow chart is missing; our reading of it
+is documented in docs/paper.md ("Reading of the paper").
 """
 
 from __future__ import annotations

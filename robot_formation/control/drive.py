@@ -1,8 +1,9 @@
 """A robot's movement and sensing system: distances to wheel rotations, encoder wheels to displacement.
 
-A preset distance becomes wheel rotations through a calibration curve per axis (paper, "Movement system calibrations": v up
-to 20 cm, u up to 10 cm). A move along several axes is driven as legs, one axis after the other in the order turn, v, u,
-because the curves hold along an axis. The realised displacement comes from the two encoder wheels (paper, "Sensing system").
+A preset distance becomes wheel rotations through a calibration curve per axis (paper, "Movement system calibrations": v
+up to 20 cm, u up to 10 cm). A move along several axes is driven as legs, one axis after the other in the order turn, v,
+u, because the curves hold along an axis. The realised displacement comes from the two encoder wheels (paper, "Sensing
+system").
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ WHEELS = ("front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_righ
 ENCODER_WHEELS = ("encoder_wheel_v", "encoder_wheel_u")
 JOINTS = WHEELS + ENCODER_WHEELS
 
-# Rotation of front left, front right, rear left, rear right per unit of the leg: mecanum kinematics with the rollers in X.
+# Rotation of front left, front right, rear left, rear right per unit of the leg: mecanum kinematics, rollers in X.
 _SIGNS = {"yaw": (-1.0, 1.0, -1.0, 1.0), "x": (1.0, 1.0, 1.0, 1.0), "y": (-1.0, 1.0, 1.0, -1.0)}
 
 
@@ -64,7 +65,7 @@ class WheelCommand:
 
 @dataclass(frozen=True)
 class DriveAction:
-    """What to send now: the next leg's rotations, or the finished move's realised displacement; a warning with either."""
+    """What to send now: the next leg's rotations or the finished move's displacement; a warning with either."""
 
     command: WheelCommand | None = None
     moved: Motion | None = None
@@ -91,7 +92,7 @@ class Drive:
         return self._busy
 
     def move(self, target: Motion) -> DriveAction:
-        """Start a move. One that can't be driven becomes a hold (no rotation) and a warning, so that it is answered too."""
+        """Start a move. One that can't be driven becomes a hold and a warning, so that it is answered too."""
         if self._busy:
             return DriveAction(warning="a move is under way: the new one is dropped; wait for 'moved'")
         reason = self._refusal(target)

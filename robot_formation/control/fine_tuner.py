@@ -1,7 +1,8 @@
-"""The follower's timestep: wait for the neighbour, move by the prediction, look and correct, report; without input or output.
+"""The follower's timestep as a state machine: wait for the neighbour, move by the prediction, look, correct, report.
 
-Paper, fig. "algorithm scheme", with a collection phase of three timesteps in which the follower first moves by the leader's
-step and then repeats its own previous displacement. Events go in, actions come out in the order to be carried out.
+Paper, fig. "algorithm scheme", with a collection phase of three timesteps in which the follower first moves by the
+leader's step and then repeats its own previous displacement. Events go in, actions come out in the order to be carried
+out; there is no input or output here.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ class RequestFrames:
 
 @dataclass(frozen=True)
 class Report:
-    """The timestep's net displacement and the camera's estimate of what is left (None if the Target face is not seen)."""
+    """The timestep's net displacement and what is left by the camera's estimate (None: Target face not seen)."""
 
     displacement: Motion
     residual: Motion | None

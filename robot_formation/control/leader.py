@@ -1,7 +1,7 @@
 """The leader: one straight step, then wait for the formation; a state machine without input or output.
 
-The leader drives with a constant wheel rotation per timestep (paper, "Experimental setups"); it starts the next timestep
-on the followers' bare ready ticks (design: a tick carries no pose and no velocity).
+The leader drives with a constant wheel rotation per timestep (paper, "Experimental setups"); it starts the next
+timestep on the followers' bare ready ticks, which carry no pose and no velocity.
 """
 
 from __future__ import annotations

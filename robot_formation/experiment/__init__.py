@@ -1,0 +1,1 @@
+"""Scenarios, in-process runs, and what a run on this machine needs."""

@@ -1,6 +1,7 @@
 """A whole run in one process: the node graph's components on a queue, without a middleware.
 
-The components, the messages and their order per topic are those of the node graph, so the run is the same to the last bit.
+The components, the messages and their order per topic are those of the node graph, so the run is the same to the last
+bit.
 """
 
 from __future__ import annotations

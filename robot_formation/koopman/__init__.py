@@ -1,0 +1,1 @@
+"""Online DMD and the predictors built on it."""

@@ -1,8 +1,8 @@
 """Online dynamic mode decomposition: a linear map learned pair by pair, by recursive least squares.
 
-Convention of the paper: K X = Y, columns are snapshots. Recursion of Zhang, Rowley, Deem and Cattafesta, "Online dynamic
-mode decomposition for time-varying systems", SIAM J. Appl. Dyn. Syst. 18(3), 2019 (arXiv 1707.02876), with *measured*
-pairs (x, y):
+Convention of the paper: K X = Y, columns are snapshots. Recursion of Zhang, Rowley, Deem and Cattafesta, "Online
+dynamic mode decomposition for time-varying systems", SIAM J. Appl. Dyn. Syst. 18(3), 2019 (arXiv 1707.02876), with
+*measured* pairs (x, y):
 
     gamma = 1 / (rho + x' P x),   K <- K + gamma (y - K x) x' P,   P <- (P - gamma P x x' P) / rho
 
@@ -24,7 +24,7 @@ _MAX_CONDITION = 1e7
 class OnlineDMD:
     """K of shape (n, n) fitted to pairs (x, y) of shape (n,); forgetting factor rho in (0, 1].
 
-    Until X has full rank K is the minimum-norm batch solution (pseudo-inverse, as in the paper's Algorithm 1); from then on
+    Until X has full rank K is the minimum-norm batch solution (pseudo-inverse, as in Algorithm 1 of the paper); then
     each update costs O(n^2).
     """
 

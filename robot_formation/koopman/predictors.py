@@ -92,7 +92,7 @@ class Previous:
 class Literal:
     """The paper's Algorithm 1 as printed: K from the first three displacements, then K^n x_3, blind to what follows.
 
-    The printed loop feeds its own forecast back as the measurement, so its innovation y - K x is zero and K never changes.
+    The printed loop feeds its own forecast back as the measurement, so its innovation y - K x is zero and K stays.
     """
 
     def __init__(self, parameters: PredictorParameters) -> None:
@@ -126,8 +126,8 @@ class Literal:
 class Measured:
     """Online DMD with measured pairs: what the paper's algorithm must have been to react to anything.
 
-    Forecast K x_t, with K the least-squares fit of all pairs (x_i, x_i+1) so far; the previous displacement until the first
-    two pairs are complete, as in the paper's collection phase.
+    Forecast K x_t, with K the least-squares fit of all pairs (x_i, x_i+1) so far; the previous displacement until the
+    first two pairs are complete, as in the paper's collection phase.
     """
 
     def __init__(self, parameters: PredictorParameters) -> None:
@@ -170,7 +170,7 @@ class PredictionError(FormationError):
 class Predictor:
     """A model with what every predictor owes its users: refusal of bad input, bounded output and a covariance.
 
-    The covariance is the mean outer product of the errors of its own past forecasts, with `sigma_m` counted as one of them.
+    The covariance is the mean outer product of the errors of its own past forecasts, `sigma_m` counted as one of them.
     """
 
     parameters: PredictorParameters

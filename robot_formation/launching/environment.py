@@ -10,8 +10,8 @@ from pathlib import Path
 def node_environment(domain: int, log_folder: Path) -> dict[str, str]:
     """Make a process's environment: its own ROS domain on this machine only, and logs that are ours to remove.
 
-    With ROS from pip also AMENT_PREFIX_PATH, which the wheels don't set, is given; LD_LIBRARY_PATH is inherited from this
-    process, where the wheels' start-up hook has set it.
+    With ROS from pip also AMENT_PREFIX_PATH, which the wheels don't set, is given; LD_LIBRARY_PATH is inherited from
+    this process, where the wheels' start-up hook has set it.
     """
     environment = dict(os.environ)
     environment.update(

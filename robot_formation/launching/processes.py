@@ -31,7 +31,7 @@ class Process:
         return f"{self.namespace.rstrip('/')}/{self.executable}"
 
     def ros_parameters(self) -> dict[str, Any]:
-        """Give the parameters as a ROS parameter file holds them: empty lists are left out, ROS can't tell their type."""
+        """Give the parameters as a ROS parameter file holds them: no empty lists, ROS can't tell their type."""
         return {name: value for name, value in self.parameters.items() if value != []}
 
 

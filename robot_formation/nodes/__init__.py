@@ -1,0 +1,1 @@
+"""rclpy adapters, one file per executable."""

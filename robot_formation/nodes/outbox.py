@@ -16,10 +16,10 @@ IMAGE_TYPE = "sensor_msgs/msg/Image"
 
 
 class Outbox:
-    """Publishes in order; the first message of a topic waits, at most for a while, until all its listeners have matched.
+    """Publishes in order; a topic's first message waits, at most for a while, until all its listeners have matched.
 
     A reliable publisher that has matched a subscription delivers everything that it publishes from then on, so nothing
-    needs to be known of the other side. Hidden nodes (names that begin with an underscore) are not waited for and don't count.
+    needs to be known of the other side. Hidden nodes (names that begin with an underscore) don't count as listeners.
     """
 
     def __init__(

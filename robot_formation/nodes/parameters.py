@@ -62,7 +62,7 @@ def declare(node: Node, *classes: type) -> list[Any]:
         if name not in known:
             raise ParameterError(f"{where}: no parameter '{name}'{suggestion(name, known)}")
     values = {name: _plain(known[name], item.value) for name, item in given.items()}
-    objects = []
+    objects: list[Any] = []
     for cls in classes:
         objects.append(from_mapping(cls, {n: v for n, v in values.items() if n in specs(cls)}, where=where))
     for name, spec in known.items():

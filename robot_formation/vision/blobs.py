@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from robot_formation.vision.strands import Strand
+
 _NO_ROW = -1
 
 
@@ -39,6 +41,16 @@ class Blob:
             self.next_start = start
         self.next_end = end
 
+    def extend(self, strand: Strand) -> None:
+        """Add the rows of a strand after its first one, which is part of the blob already."""
+        _, start, end, last, last_start, last_end, left, right, area = strand
+        self.left = min(self.left, left)
+        self.right = max(self.right, right)
+        self.area += area - (end - start + 1)
+        self.next_row = last
+        self.next_start = last_start
+        self.next_end = last_end
+
     def absorb(self, other: Blob) -> None:
         """Take over a blob to the right that the row being built connects to this one."""
         self.area += other.area
@@ -56,17 +68,18 @@ class Blob:
             self.next_row = _NO_ROW
 
 
-def connect(segments: Iterable[tuple[int, int, int]]) -> list[Blob]:
-    """Connect the segments (row, start, end) of one signature to blobs, largest area first.
+def connect(strands: Iterable[Strand]) -> list[Blob]:
+    """Connect the strands of one signature, in the order of the scan, to blobs, largest area first.
 
-    A segment joins a blob that it overlaps or touches by one column, diagonals included, on the row above. The blobs
+    A strand joins a blob that it overlaps or touches by one column, diagonals included, on the row above. The blobs
     that can still grow are kept from left to right; a new one goes before the cursor, out of reach of its own row.
     """
     active: list[Blob] = []
     finished: list[Blob] = []
     current = _NO_ROW
     cursor = 0
-    for row, start, end in segments:
+    for strand in strands:
+        row, start, end, last_row = strand[:4]
         if row != current:
             current = row
             cursor = 0
@@ -79,7 +92,8 @@ def connect(segments: Iterable[tuple[int, int, int]]) -> list[Blob]:
                 _refresh(active, cursor + 1, row, finished)
                 continue
             if end < blob.start:
-                active.insert(cursor, Blob(row, start, end))
+                blob = Blob(row, start, end)
+                active.insert(cursor, blob)
                 cursor += 1
                 break
             blob.attach(row, start, end)
@@ -89,8 +103,12 @@ def connect(segments: Iterable[tuple[int, int, int]]) -> list[Blob]:
                 _refresh(active, following, row, finished)
             break
         else:
-            active.append(Blob(row, start, end))
+            blob = Blob(row, start, end)
+            active.append(blob)
             cursor += 1
+        if last_row > row:
+            blob.extend(strand)
+            _finish_others(active, blob, finished)
     for blob in active:
         blob.finish_row()
     # The camera puts each finished blob in front of the earlier ones: that decides among equal areas.
@@ -99,6 +117,16 @@ def connect(segments: Iterable[tuple[int, int, int]]) -> list[Blob]:
 
 def _by_area(blob: Blob) -> int:
     return -blob.area
+
+
+def _finish_others(active: list[Blob], blob: Blob, finished: list[Blob]) -> None:
+    """Finish all blobs but one, to which alone the next row belongs."""
+    for other in active:
+        if other is not blob:
+            other.finish_row()
+            if other.row - other.top > 1:
+                finished.append(other)
+    active[:] = [blob]
 
 
 def _refresh(active: list[Blob], position: int, row: int, finished: list[Blob]) -> None:

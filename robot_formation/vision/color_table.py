@@ -13,8 +13,10 @@ from robot_formation.vision.parameters import SIGNATURES, DetectorParameters
 from robot_formation.vision.signatures import Signature
 from robot_formation.vision.teaching import SCALE_BITS
 
-BINS = 64
-"""Bins per axis: the difference r-g (or b-g) of -255..255 in steps of 8."""
+CENTRE = 32
+"""Bin of the difference 0: bin i holds the differences r-g (or b-g) from 8 (i - 32) to 8 (i - 32) + 7."""
+_BINS = 64
+_STRIDE = 256
 _CODE_GAIN = np.float32(1.5)
 
 
@@ -49,7 +51,7 @@ class ColorTable:
     """All that the scanner asks per cell.
 
     Attributes:
-        labels: signature number or 0 by 64 * iu + iv, shape (4096,), uint8; iu = ((r-g) >> 3) + 32, iv alike from b-g.
+        labels: signature number or 0 by 256 * iu + iv, shape (16384,), uint8; iu is the bin of r-g, iv that of b-g.
         low: exclusive lower bounds of u and v by signature number, shape (2, 8).
         high: exclusive upper bounds, alike.
         min_sum: smallest r+g+b.
@@ -62,10 +64,10 @@ class ColorTable:
 
     @classmethod
     def of(cls, signatures: Iterable[Signature], parameters: DetectorParameters) -> ColorTable:
-        """Build the table; about 10 ms, so once per change of signatures or parameters, not per frame."""
+        """Build the table: once per change of signatures or parameters, not per frame."""
         u, v, total, bins = _colors()
         min_sum = max(1, int(np.float32(765) * np.float32(parameters.min_brightness)))
-        labels = np.zeros(BINS * BINS, np.uint8)
+        labels = np.zeros(_BINS * _STRIDE, np.uint8)
         low, high = np.zeros((2, 2, SIGNATURES + 1))
         # Lower numbers win, hence are written last.
         for signature in sorted(signatures, key=lambda s: -s.sig):
@@ -91,5 +93,5 @@ def _colors() -> tuple[_Int32, _Int32, _Int32, _Int32]:
     divisor = np.maximum(total, 1)
     u = ((r - g << SCALE_BITS) / divisor).astype(np.int32)
     v = ((b - g << SCALE_BITS) / divisor).astype(np.int32)
-    bins = ((r - g >> 3) + BINS // 2) * BINS + (b - g >> 3) + BINS // 2
+    bins = ((r - g >> 3) + CENTRE) * _STRIDE + (b - g >> 3) + CENTRE
     return u, v, total, bins

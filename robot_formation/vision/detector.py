@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-
 from robot_formation.vision.blobs import connect
 from robot_formation.vision.block import Block
 from robot_formation.vision.boxes import CODE_AREA, Box, filtered, merged, without_nested
@@ -16,6 +14,7 @@ from robot_formation.vision.parameters import DetectorParameters
 from robot_formation.vision.picture import checked
 from robot_formation.vision.scanner import Segments, scan
 from robot_formation.vision.signatures import Signature, sorted_unique
+from robot_formation.vision.strands import strands
 from robot_formation.vision.tracking import Tracker, limited
 
 ALL_SIGNATURES = 0xFF
@@ -123,19 +122,13 @@ class BlockDetector:
         parameters = self._parameters
         boxes: list[Box] = []
         room = parameters.max_blocks
-        order = np.argsort(segments.signature, kind="stable")
-        ordered = segments.signature[order]
-        listed = list(zip(*(array[order].tolist() for array in segments[1:]), strict=True))
-        for signature in self._signatures:
-            number = signature.sig
-            begin, end = np.searchsorted(ordered, (number, number + 1)).tolist()
-            if begin == end:
-                continue
+        found = strands(segments)
+        for number in sorted(found):
             code = number in self._codes
-            blobs = connect(listed[begin:end])[: parameters.max_blocks_per_signature]
-            found = filtered(number, blobs, CODE_AREA if code else parameters.min_block_area, room)
-            room -= len(found)
-            boxes += found if code else merged(found, parameters.max_merge_dist)
+            blobs = connect(found[number])[: parameters.max_blocks_per_signature]
+            mine = filtered(number, blobs, CODE_AREA if code else parameters.min_block_area, room)
+            room -= len(mine)
+            boxes += mine if code else merged(mine, parameters.max_merge_dist)
         boxes = without_nested(boxes)
         if not self._codes:
             return boxes

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from robot_formation.vision.color_table import BINS, ColorTable
+from robot_formation.vision.color_table import CENTRE, ColorTable
 from robot_formation.vision.picture import CELLS, HEIGHT, Picture
 from robot_formation.vision.teaching import SCALE_BITS
 
@@ -47,7 +47,7 @@ def scan(picture: Picture, table: ColorTable) -> Segments:
     # Exact: both operands are below 2**25, where the double's quotient truncates as the integer division does.
     chroma = np.trunc((colors[::2] - colors[1]) * _CHROMA_SCALE / total)
     inside = (chroma > table.low.take(signature, axis=1)) & (chroma < table.high.take(signature, axis=1))
-    kept = np.flatnonzero(inside[0] & inside[1] & (total >= table.min_sum))
+    kept = (inside[0] & inside[1] & (total >= table.min_sum)).nonzero()[0]
     if not len(kept):
         return _NONE
     row, column = np.divmod(first[kept], CELLS)
@@ -66,12 +66,11 @@ def _labels(planes: npt.NDArray[np.uint8], table: ColorTable) -> npt.NDArray[np.
     """Signature number or 0 of each cell, shape (208, 158)."""
     r, g, b = planes
     # d / 8 + 32 - 7/16 rounds to (d >> 3) + 32 for every integer d; one vectorised pass instead of four.
-    offset = BINS / 2 - 0.4375
+    offset = CENTRE - 0.4375
     iu = cv2.addWeighted(r, 0.125, g, -0.125, offset)
     iv = cv2.addWeighted(b, 0.125, g, -0.125, offset)
-    index = iu.astype(np.uint16)
-    index *= BINS
-    index += iv
+    # The two bytes of a cell, read as one little-endian number, are iv + 256 * iu.
+    index = cv2.merge((iv, iu)).view("<u2")[..., 0]
     labels: npt.NDArray[np.uint8] = table.labels.take(index.astype(np.intp))
     return labels
 
@@ -83,16 +82,17 @@ def _hits(labels: npt.NDArray[np.uint8]) -> tuple[IntArray, IntArray]:
     a pair. So a run of equal labels yields a hit every four cells from where the scanner enters it, and how far it
     enters depends on the run before it only if that is nearer than two cells.
     """
-    change = np.empty(labels.shape, np.bool_)
-    np.not_equal(labels[:, 1:], labels[:, :-1], out=change[:, 1:])
-    change[:, 0] = True
-    bounds = np.append(np.flatnonzero(change), labels.size)
-    label = labels.ravel()[bounds[:-1]]
-    runs = np.flatnonzero(label)
+    flat = labels.ravel()
+    change = np.empty(len(flat) + 1, np.bool_)
+    np.not_equal(flat[1:], flat[:-1], out=change[1:-1])
+    change[::CELLS] = True
+    bounds = change.nonzero()[0]
+    label = flat[bounds[:-1]]
+    runs = label.nonzero()[0]
     start, stop = bounds[runs], bounds[runs + 1]
     rest = stop - start - _entries(start, stop)
     count = np.maximum(rest + 2, 0) >> 2
-    before = np.cumsum(count) - count
+    before = count.cumsum() - count
     first = np.repeat(stop - rest - _STEP * before, count)
     first += _STEP * np.arange(len(first))
     return first, np.repeat(label[runs].astype(np.int64), count)
@@ -102,7 +102,8 @@ def _entries(start: IntArray, stop: IntArray) -> IntArray:
     """Cells of each run [start, stop) that the scanner skips before it looks at one; may exceed the run."""
     entry = np.zeros(len(start), np.int64)
     gap = start[1:] - stop[:-1]
-    near = np.flatnonzero((gap < 2) & (start[1:] // CELLS == start[:-1] // CELLS))
+    near = (gap < 2).nonzero()[0]
+    near = near[start[near + 1] // CELLS == start[near] // CELLS]
     if not len(near):
         return entry
     gap = gap[near]
@@ -112,7 +113,7 @@ def _entries(start: IntArray, stop: IntArray) -> IntArray:
         rest = length - entry[near]
         past = np.where(rest > 0, _OVERSHOOT[rest & 3], -rest)
         settled = np.maximum(past - gap, 0)
-        if np.array_equal(settled, entry[near + 1]):
+        if (settled == entry[near + 1]).all():
             return entry
         entry[near + 1] = settled
 
@@ -122,18 +123,23 @@ def _segments(signature: IntArray, row: IntArray, column: IntArray) -> Segments:
 
     Only the last segment of a row gets its true first cell, and that of the picture's last row is lost.
     """
-    same_row = row[1:] == row[:-1]
-    near = same_row & (column[1:] - column[:-1] <= _BRIDGE)
-    same_signature = signature[1:] == signature[:-1]
-    begins = np.concatenate(([0], np.flatnonzero(~(near & same_signature)) + 1))
-    last = np.append(begins[1:] - 1, len(column) - 1)
-    # What follows a segment's last hit: a near hit of another signature ends it there, a row's end closes it.
-    cut = np.append(near & ~same_signature, False)[last]
-    closed = np.append(~same_row, True)[last]
-    end = column[last] + 1
-    end[cut] = column[last[cut] + 1]
-    start = column[begins] - closed
-    segments = Segments(signature[begins], row[begins], start, end)
-    if closed[-1] and segments.row[-1] == HEIGHT - 1:
+    # What follows a hit: nothing near in its row, a near hit of its signature, or a near hit of another one.
+    count = len(column)
+    closed, last, cut = np.ones((3, count), np.bool_)
+    np.not_equal(row[1:], row[:-1], out=closed[:-1])
+    near = (column[1:] - column[:-1] <= _BRIDGE) & ~closed[:-1]
+    same = signature[1:] == signature[:-1]
+    last[:-1] = ~(near & same)
+    cut[:-1] = near & ~same
+    cut[-1] = False
+    final = last.nonzero()[0]
+    first = np.zeros_like(final)
+    first[1:] = final[:-1] + 1
+    end = column[final] + 1
+    # A near hit of another signature ends the segment where that one begins.
+    cut_at = final[cut[final]]
+    end[cut[final]] = column[cut_at + 1]
+    segments = Segments(signature[final], row[final], column[first] - closed[final], end)
+    if segments.row[-1] == HEIGHT - 1:
         return Segments(*(array[:-1] for array in segments))
     return segments
