@@ -1,7 +1,7 @@
 """Distance driven against wheel rotation, as the simulated robots do it: the default calibration, and what it is worth.
 
 Prints the fits of wheel rotation on distance for an ideal robot on the plane (the defaults of config/drive.yaml), the
-spread of a calibrated 5 cm move over robots with the default imperfections, and what the bowl makes of an uncalibrated one.
+spread of a calibrated 5 cm move over robots with the default imperfections, and what the bowl makes of one without.
 
 Run: python bench/drive_calibration.py [--robots N]
 """
@@ -86,7 +86,9 @@ def main():
     gradient = make_surface("bowl").gradient(MIDDLE_M, NEAR_EDGE_M)
     slope_deg = math.degrees(math.atan(math.hypot(*gradient)))
     print(f"bowl at ({MIDDLE_M}, {NEAR_EDGE_M}) m, slope {slope_deg:.1f} deg, no imperfections, wheels turned")
-    print(f"  by {STEP_M * 1e3:g} mm of rolling without calibration; driven along v, and to the lower side when across:")
+    print(
+        f"  by {STEP_M * 1e3:g} mm of rolling without calibration; driven along v, and to the lower side when across:"
+    )
     for mode in DRIVE_MODES:
         ideal = world_parameters(ideal=True, drive_mode=mode)
         moved = {

@@ -147,7 +147,8 @@ def read_joint_states(message: JointState) -> tuple[list[float], list[float]]:
     missing = [name for name in JOINTS if name not in index]
     if missing or len(message.position) != len(index) or len(message.velocity) != len(index):
         raise MessageError(
-            f"joint_states must have position and velocity of {', '.join(JOINTS)}; missing: {', '.join(missing)}"
+            f"joint_states must have one position and one velocity of each joint ({', '.join(JOINTS)}); "
+            f"missing: {', '.join(missing) or 'values'}"
         )
     positions = [float(message.position[index[name]]) for name in JOINTS]
     velocities = [float(message.velocity[index[name]]) for name in JOINTS]
@@ -171,7 +172,10 @@ def move(motion: Motion, frame: str, stamp_ns: int) -> PoseStamped:
 def read_pose(pose: Pose) -> Motion:
     """Read a planar displacement: x, y and yaw. Not-finite values are kept for the core to refuse."""
     o = pose.orientation
-    yaw = math.atan2(2.0 * (o.w * o.z + o.x * o.y), 1.0 - 2.0 * (o.y * o.y + o.z * o.z))
+    # A quaternion of any length gives its yaw; atan2 would make a number of infinite components.
+    yaw = math.atan2(2.0 * (o.w * o.z + o.x * o.y), o.w * o.w + o.x * o.x - o.y * o.y - o.z * o.z)
+    if not all(map(math.isfinite, (o.x, o.y, o.z, o.w))):
+        yaw = math.nan
     return Motion(float(pose.position.x), float(pose.position.y), yaw)
 
 
@@ -311,11 +315,10 @@ def blocks(found: Sequence[Block], frame: str, stamp_ns: int) -> PointCloud2:
 
 def read_blocks(message: PointCloud2) -> list[Block]:
     """Read blocks."""
-    names = [field.name for field in message.fields]
-    if names != list(BLOCK_DTYPE.names or ()) or message.point_step != BLOCK_DTYPE.itemsize or message.is_bigendian:
-        raise MessageError(
-            f"blocks must have the fields {', '.join(BLOCK_DTYPE.names or ())}, little endian, not {names}"
-        )
+    if list(message.fields) != _block_fields() or message.point_step != BLOCK_DTYPE.itemsize or message.is_bigendian:
+        layout = ", ".join(f"{name} {BLOCK_DTYPE[name].name}" for name in BLOCK_DTYPE.names or ())
+        names = ", ".join(field.name for field in message.fields) or "nothing"
+        raise MessageError(f"blocks must have the packed little-endian fields {layout}; these have {names}")
     if len(message.data) != message.width * message.height * BLOCK_DTYPE.itemsize:
         raise MessageError(f"blocks of {message.width} points have {len(message.data)} bytes: cut off or mis-sized")
     points = np.frombuffer(message.data, dtype=BLOCK_DTYPE)

@@ -146,7 +146,10 @@ def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
     if kind is float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise wrong
-        value = float(value)
+        try:
+            value = float(value)
+        except OverflowError:  # a whole number of more than 308 digits
+            value = math.inf
         if not math.isfinite(value):
             raise ParameterError(f"{where}: '{spec.name}' must be finite, not {value!r}")
     elif kind is int:

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 from robot_formation.analysis.from_bag import load_run
@@ -80,20 +79,15 @@ class BusyCores:
 
 
 class Killer:
-    """Kills a node of a run as soon as the bag's progress reaches a timestep."""
+    """Sends a signal to one node of a run, or to another process, when the run has finished a number of timesteps."""
 
-    def __init__(self, node, number, after_lines):
-        self._node, self._number, self._after = node, number, after_lines
-        self._pids: dict[str, int] = {}
-        self._lines = 0
-        self.pids: dict[str, int] = {}
-        self._lock = threading.Lock()
+    def __init__(self, node, number, after_timesteps):
+        self._node, self._number, self._after = node, number, after_timesteps
+        self.pids = {}
 
     def started(self, domain, pids):
         self.pids = dict(pids)
 
     def say(self, text):
-        if "timestep" in text:
-            self._lines += 1
-            if self._lines == self._after:
-                os.kill(self.pids[self._node], self._number)
+        if text.startswith(f"timestep {self._after:2d}/"):
+            os.kill(self.pids[self._node], self._number)

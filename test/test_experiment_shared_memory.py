@@ -2,6 +2,7 @@
 
 import fcntl
 import importlib.util
+import mmap
 import os
 import subprocess
 import sys
@@ -68,12 +69,20 @@ def test_a_lock_file_that_is_open_but_not_yet_locked_counts_as_alive(tmp_path):
     assert clean_orphans(folder=tmp_path) == [SEGMENT, f"{SEGMENT}_el"]
 
 
-def test_files_that_tell_nothing_about_their_owner_and_foreign_files_stay(tmp_path):
-    make(
-        tmp_path, SEGMENT, "sem.fastrtps_port7413_mutex", "fastrtps_port", "fastrtps_xyz_el", "somebody_elses", "lttng"
-    )
+def test_a_port_without_lock_file_is_removed_unless_somebody_has_it_mapped(tmp_path):
+    port = "fastrtps_port7413"
+    make(tmp_path, port)
+    (tmp_path / port).write_bytes(b"x")
+    with open(tmp_path / port, "r+b") as file, mmap.mmap(file.fileno(), 0):
+        file.close()
+        assert clean_orphans(folder=tmp_path) == []
+    assert clean_orphans(folder=tmp_path) == [port]
+
+
+def test_foreign_files_stay(tmp_path):
+    make(tmp_path, "fastrtps_port", "fastrtps_xyz_el", "somebody_elses", "lttng")
     assert clean_orphans(folder=tmp_path) == []
-    assert len(list(tmp_path.iterdir())) == 6
+    assert len(list(tmp_path.iterdir())) == 4
 
 
 def test_cleaning_one_domain_leaves_the_ports_of_others(tmp_path):

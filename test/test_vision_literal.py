@@ -8,6 +8,7 @@ import pytest
 from vision_helpers import GROUPS, PARAMETERS, random_picture
 from vision_literal import LiteralDetector
 
+from robot_formation.vision.color_table import ColorTable
 from robot_formation.vision.detector import BlockDetector
 from robot_formation.vision.parameters import DetectorParameters
 
@@ -47,6 +48,7 @@ def test_many_random_pictures_give_the_segments_and_boxes_of_the_literal_reading
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_the_color_table_is_that_of_the_literal_reading(name):
-    fast, literal = pair(name)
-    shifted = [literal.table[64 * ((iu - 32) & 63) + ((iv - 32) & 63)] for iu in range(64) for iv in range(64)]
-    assert fast._table.labels.reshape(64, 256)[:, :64].ravel().tolist() == shifted
+    _, literal = pair(name)
+    labels = ColorTable.of(GROUPS["G1"], SETTINGS[name]).labels.reshape(64, 256)[:, :64]
+    shifted = [[literal.table[64 * ((iu - 32) & 63) + ((iv - 32) & 63)] for iv in range(64)] for iu in range(64)]
+    assert labels.tolist() == shifted

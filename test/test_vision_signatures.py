@@ -124,9 +124,10 @@ GOOD = "{sig: 1, uMin: 1, uMax: 3, uMean: 2, vMin: 1, vMax: 3, vMean: 2}"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "no list 'signatures'"),
-        ("signatures: 5", "no list 'signatures'"),
-        ("- 1", "no list 'signatures'"),
+        ("", "holds no signatures"),
+        ("signatures: []", "holds no signatures"),
+        ("signatures: 5", "holds no signatures"),
+        ("- 1", "holds no signatures"),
         ("signatures: [5]", "must be a mapping"),
         ("signatures: [{sig: 1}]", "lacks uMin"),
         (f"signatures: [{GOOD[:-1]}, speed: 2}}]", "no 'speed'"),

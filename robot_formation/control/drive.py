@@ -82,7 +82,6 @@ class Drive:
         self._realised = Motion()
         self._reference: tuple[float, ...] | None = None  # joint positions at the leg's start
         self._leg_start_ns: int | None = None
-        self._last_stamp_ns = 0
         self._stopping = False
         self.odometry = Motion()
 
@@ -116,7 +115,6 @@ class Drive:
 
         Joints are ordered as `JOINTS`. Non-finite values must have been refused before.
         """
-        self._last_stamp_ns = stamp_ns
         if self._reference is None:
             # Joints count from zero at the start of the world, so the first report needs no earlier one.
             self._reference = (0.0,) * len(JOINTS)
@@ -149,10 +147,11 @@ class Drive:
         p = self._parameters
         if not target.finite:
             return "refused a move that is not finite"
+        turn, forward, left = _leg_lengths(target)
         for name, value, limit in (
-            ("v", abs(target.v_m), p.max_v_m),
-            ("u", abs(target.u_m), p.max_u_m),
-            ("turn", abs(target.yaw_rad), p.max_turn_rad),
+            ("v", abs(forward), p.max_v_m),
+            ("u", abs(left), p.max_u_m),
+            ("turn", abs(turn), p.max_turn_rad),
         ):
             if value > limit:
                 return f"refused a move of {value:.3f} in {name}: beyond the calibrated range of {limit}"
@@ -160,13 +159,10 @@ class Drive:
 
     def _plan(self, target: Motion) -> list[WheelCommand]:
         curves = self._parameters.calibration
-        # The turn comes first, so the translation is expressed in the frame that it leads to.
-        cosine, sine = math.cos(target.yaw_rad), math.sin(target.yaw_rad)
-        forward = cosine * target.x_m + sine * target.y_m
-        left = cosine * target.y_m - sine * target.x_m
+        turn, forward, left = _leg_lengths(target)
         legs = []
         for axis, amount, curve in (
-            ("yaw", target.yaw_rad, curves.turn),
+            ("yaw", turn, curves.turn),
             ("x", forward, curves.v),
             ("y", left, curves.u),
         ):
@@ -196,3 +192,9 @@ class Drive:
             left * p.encoder_radius_m - yaw * p.encoder_u_offset_m,
             yaw,
         )
+
+
+def _leg_lengths(target: Motion) -> tuple[float, float, float]:
+    """Turn [rad], forward and left [m]: the turn comes first, so the others are expressed in the frame it leads to."""
+    cosine, sine = math.cos(target.yaw_rad), math.sin(target.yaw_rad)
+    return target.yaw_rad, cosine * target.x_m + sine * target.y_m, cosine * target.y_m - sine * target.x_m

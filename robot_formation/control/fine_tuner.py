@@ -140,12 +140,12 @@ class FineTuner:
         """The drive has finished the outstanding move."""
         if self._phase is not Phase.MOVE:
             return [Warn("a 'moved' that nobody asked for is ignored")]
+        self.stamp_ns = stamp_ns
         if not motion.finite:
             return [
                 Warn("a 'moved' that is not finite is ignored: the displacement of this move is lost"),
                 *self._look(),
             ]
-        self.stamp_ns = stamp_ns
         self._displacement = self._displacement.then(motion)
         return self._look()
 

@@ -53,13 +53,10 @@ def fast_dds_files(folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
 def find_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
     """List the groups of files whose owners are all dead; removes nothing. Arguments as for clean_orphans."""
     groups = {group: names for group, names in fast_dds_files(folder).items() if _belongs(group, domain)}
-    orphans = {}
-    for group, names in groups.items():
-        held = _lock_all(folder, names)
-        if held:
-            orphans[group] = names
-            _unlock(held)
-    return orphans
+    if not groups:
+        return {}
+    in_use = _used_files(folder)
+    return {group: names for group, names in groups.items() if in_use.isdisjoint(names) and _unlocked(folder, names)}
 
 
 def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> list[str]:
@@ -74,16 +71,9 @@ def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> li
         The names of the removed files. Files that this user may not remove are passed over.
     """
     removed: list[str] = []
-    candidates = find_orphans(domain, folder)
-    if not candidates:
-        return removed
-    in_use = _opened_files(folder)
-    for names in candidates.values():
-        # A starting process opens its lock file just before it locks it: whatever somebody has open is not dead.
-        if in_use.intersection(names):
-            continue
+    for names in find_orphans(domain, folder).values():
         held = _lock_all(folder, names)  # kept while removing, so that no new process takes the files over meanwhile
-        if not held:
+        if held is None:
             continue
         for name in names:
             with contextlib.suppress(OSError):
@@ -102,8 +92,19 @@ def _belongs(group: str, domain: int | None) -> bool:
     return port < FIRST_PORT or port in domain_ports(domain)
 
 
-def _lock_all(folder: Path, names: list[str]) -> list[int]:
-    """Lock a group's lock files; returns their descriptors, none if an owner lives or nothing tells about the owner."""
+def _unlocked(folder: Path, names: list[str]) -> bool:
+    held = _lock_all(folder, names)
+    if held is not None:
+        _unlock(held)
+    return held is not None
+
+
+def _lock_all(folder: Path, names: list[str]) -> list[int] | None:
+    """Lock a group's lock files; returns their descriptors, None if an owner lives.
+
+    There may be none to lock: the last one in good order to leave a port that a killed process shared takes the lock
+    files with it and leaves the port.
+    """
     held: list[int] = []
     for name in names:
         if not name.endswith(("_el", "_sl")):
@@ -113,7 +114,7 @@ def _lock_all(folder: Path, names: list[str]) -> list[int]:
             fcntl.flock(held[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             _unlock(held)
-            return []
+            return None
     return held
 
 
@@ -122,15 +123,23 @@ def _unlock(descriptors: list[int]) -> None:
         os.close(descriptor)
 
 
-def _opened_files(folder: Path) -> set[str]:
-    """List the lock files that any process has open, as far as this user can see."""
-    prefix = f"{folder}/fastrtps_"
+def _used_files(folder: Path) -> set[str]:
+    """List the files in the folder that any process has open or mapped, as far as this user can see.
+
+    A starting process opens its lock file just before it locks it, so a free lock alone does not mean a dead owner.
+    """
+    prefix = f"{folder}/"
     found: set[str] = set()
-    for process in Path("/proc").glob("[0-9]*/fd"):
+    for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            for descriptor in os.listdir(process):
+            for line in (process / "maps").read_text().splitlines():
+                place = line.find(prefix)
+                if place >= 0:
+                    found.add(line[place + len(prefix) :])
+        with contextlib.suppress(OSError):
+            for descriptor in os.listdir(process / "fd"):
                 with contextlib.suppress(OSError):
-                    target = os.readlink(process / descriptor)
-                    if target.startswith(prefix) and target.endswith(("_el", "_sl")):
-                        found.add(os.path.basename(target))
+                    target = os.readlink(process / "fd" / descriptor)
+                    if target.startswith(prefix):
+                        found.add(target[len(prefix) :])
     return found

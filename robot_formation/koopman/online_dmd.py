@@ -19,13 +19,16 @@ Vector = NDArray[np.float64]
 
 # Above this condition number of X the inverse of X X' has no correct digit left, so the start is postponed.
 _MAX_CONDITION = 1e7
+# Far beyond any P that data can give, far below overflow.
+_MAX_P = 1e100
 
 
 class OnlineDMD:
     """K of shape (n, n) fitted to pairs (x, y) of shape (n,); forgetting factor rho in (0, 1].
 
     Until X has full rank K is the minimum-norm batch solution (pseudo-inverse, as in Algorithm 1 of the paper); then
-    each update costs O(n^2).
+    each update costs O(n^2). With forgetting a guard against windup, O(n^3), comes on top: while the data leave a
+    direction unexcited for so long that P would lose its last correct digit, nothing is forgotten.
     """
 
     def __init__(self, dimension: int, *, forgetting: float = 1.0) -> None:
@@ -62,7 +65,7 @@ class OnlineDMD:
         if self._p is None:
             self._start(x, y)
             return innovation
-        rho = self._forgetting
+        rho = self._forgetting if self._may_forget() else 1.0
         px = self._p @ x
         gamma = 1.0 / (rho + float(x @ px))
         self.k = self.k + gamma * np.outer(innovation, px)
@@ -70,12 +73,18 @@ class OnlineDMD:
         self._p = (p + p.T) / 2.0  # rounding must not make P asymmetric
         return innovation
 
+    def _may_forget(self) -> bool:
+        if self._forgetting == 1.0 or self._p is None:
+            return False
+        eigenvalues = np.linalg.eigvalsh(self._p)
+        return bool(eigenvalues[-1] <= min(eigenvalues[0] * _MAX_CONDITION**2, _MAX_P))
+
     def _start(self, x: Vector, y: Vector) -> None:
         self._pairs.append((x, y))
         weights = np.sqrt(self._forgetting) ** np.arange(len(self._pairs) - 1, -1, -1)
         xs = np.column_stack([pair[0] for pair in self._pairs]) * weights
         ys = np.column_stack([pair[1] for pair in self._pairs]) * weights
-        self.k = ys @ np.linalg.pinv(xs)
+        self.k = ys @ np.linalg.pinv(xs, rcond=1.0 / _MAX_CONDITION)
         singular = np.linalg.svd(xs, compute_uv=False)
         if len(singular) == self.k.shape[0] and singular[-1] * _MAX_CONDITION > singular[0] > 0.0:
             self._p = np.linalg.inv(xs @ xs.T)

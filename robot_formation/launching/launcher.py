@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import shutil
 import signal
 import tempfile
 import time
@@ -31,6 +32,7 @@ from robot_formation.launching.environment import node_environment
 from robot_formation.launching.processes import RECORDER, processes
 
 _POLL_S = 0.05
+CUT_OFF_SUFFIX = ".cut_off"
 _BAD_INPUT_EXIT_CODE = 2
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
@@ -160,11 +162,16 @@ class Launcher:
         if not partial.exists():
             result.bag = None
             return
+        cut_off = self.bag.with_name(self.bag.name + CUT_OFF_SUFFIX)
+        partial.rename(cut_off)  # the whole bag is written under the partial one's name first
         try:
-            recover(partial, self.bag)
+            report = recover(cut_off, self.bag)
         except BagError as error:
             result.warnings.append(str(error))
             result.bag = None
+            return
+        if report.damaged_chunks == 0:  # what else is missing had not been written: nothing more to get out of it
+            shutil.rmtree(cut_off)
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:

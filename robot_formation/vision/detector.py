@@ -12,7 +12,7 @@ from robot_formation.vision.codes import with_codes
 from robot_formation.vision.color_table import ColorTable, is_code
 from robot_formation.vision.parameters import DetectorParameters
 from robot_formation.vision.picture import checked
-from robot_formation.vision.scanner import Segments, scan
+from robot_formation.vision.scanner import Scanner, Segments
 from robot_formation.vision.signatures import Signature, sorted_unique
 from robot_formation.vision.strands import strands
 from robot_formation.vision.tracking import Tracker, limited
@@ -58,7 +58,7 @@ class BlockDetector:
         """
         self._signatures = sorted_unique(signatures)
         self._parameters = parameters
-        self._table = ColorTable.of(self._signatures, parameters)
+        self._scanner = Scanner(ColorTable.of(self._signatures, parameters))
         self._codes = {s.sig for s in self._signatures if is_code(s, parameters.color_code_mode)}
         self._tracker.configure(parameters.block_filtering, parameters.max_tracking_velocity)
 
@@ -79,7 +79,7 @@ class BlockDetector:
         Raises:
             PictureError: if the picture has another shape or type.
         """
-        return self._boxes(scan(checked(picture), self._table))
+        return self._boxes(self._scanner.scan(checked(picture)))
 
     def process(self, picture: Any, time_us: int) -> list[Block]:
         """Take the next frame and report the tracked blocks.
@@ -113,7 +113,7 @@ class BlockDetector:
         Raises:
             PictureError: if the picture has another shape or type.
         """
-        found = scan(checked(picture), self._table)
+        found = self._scanner.scan(checked(picture))
         columns = (found.signature, found.row, found.start, found.end - found.start)
         return list(zip(*(column.tolist() for column in columns), strict=True))
 

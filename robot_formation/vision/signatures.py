@@ -171,7 +171,7 @@ def load_signatures(path: str | Path) -> list[Signature]:
     """Read a YAML or JSON file with a list `signatures`, as `save_signatures` writes it.
 
     Raises:
-        SignatureError: if the file can't be read, holds no such list, or a signature is wrong or doubled.
+        SignatureError: if the file can't be read, holds no signatures, or one is wrong or doubled.
     """
     try:
         content = yaml.safe_load(Path(path).read_bytes())
@@ -181,8 +181,8 @@ def load_signatures(path: str | Path) -> list[Signature]:
         reason = " ".join(str(error).split())[:120]
         raise SignatureError(f"{path}: is neither YAML nor JSON ({reason})") from error
     listed = content.get("signatures") if isinstance(content, Mapping) else None
-    if not isinstance(listed, list):
-        raise SignatureError(f"{path}: holds no list 'signatures'; make one with 'formation teach'")
+    if not isinstance(listed, list) or not listed:
+        raise SignatureError(f"{path}: holds no signatures (a list 'signatures'); make one with 'formation teach'")
     signatures = [Signature.from_mapping(item, where=str(path)) for item in listed]
     try:
         return sorted_unique(signatures)

@@ -1,0 +1,109 @@
+"""Rewrites the parameter tables of the node pages from the dataclasses that declare the parameters.
+
+The table of a page stands between the comments <!-- parameters --> and <!-- /parameters -->.
+
+Run: python docs/make_parameter_tables.py [--check]
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from robot_formation.components.catalogue import KINDS
+from robot_formation.errors import FormationError
+from robot_formation.experiment.scenario import node_defaults
+from robot_formation.nodes.parameters import HostParameters
+from robot_formation.nodes.recorder import RecorderParameters
+from robot_formation.parameters import Spec, specs
+
+PAGES = Path(__file__).parent / "nodes"
+COMMON = "common"
+HEAD = "| name | type | unit | default | range | description |\n|---|---|---|---|---|---|"
+_TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- /parameters -->)", re.DOTALL)
+_TYPES: dict[Any, str] = {
+    bool: "bool",
+    int: "int",
+    float: "double",
+    str: "string",
+    tuple[float, ...]: "double[]",
+    tuple[int, ...]: "int[]",
+    tuple[str, ...]: "string[]",
+}
+
+
+def parameter_classes() -> dict[str, type]:
+    """List the parameter class of every page, by the page's name."""
+    classes = {name: kind.parameter_class() for name, kind in KINDS.items()}
+    return {**classes, "recorder": RecorderParameters, COMMON: HostParameters}
+
+
+def table(name: str, parameters: type) -> str:
+    """Make a page's table; where config/NODE.yaml differs from the default, its value is given too."""
+    configured = node_defaults(name) if name in KINDS else {}
+    return "\n".join([HEAD, *(_row(spec, configured) for spec in specs(parameters).values())])
+
+
+def updated(name: str, parameters: type) -> tuple[str, str]:
+    """Return a page's text as it is, and as it should be.
+
+    Raises:
+        FormationError: if the page has no place for the table.
+    """
+    path = PAGES / f"{name}.md"
+    text = path.read_text(encoding="utf-8")
+    if len(_TABLE.findall(text)) != 1:
+        raise FormationError(f"{path} needs <!-- parameters --> and <!-- /parameters --> once, each on its own line")
+    return text, _TABLE.sub(lambda match: f"{match[1]}{table(name, parameters)}\n{match[2]}", text)
+
+
+def _row(spec: Spec, configured: dict[str, Any]) -> str:
+    default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
+    said = _value(default)
+    if spec.name in configured and configured[spec.name] != default:
+        said += f"; {_value(configured[spec.name])} in config"
+    description = spec.description[:1].upper() + spec.description[1:]
+    cells = (f"`{spec.name}`", _TYPES[spec.type], spec.unit, said, _range(spec), description.replace("|", "\\|"))
+    return "| " + " | ".join(cells) + " |"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(_value(item) for item in value)}]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, (int, float)):
+        return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"`{value}`".replace("|", "\\|") if value != "" else '`""`'
+
+
+def _range(spec: Spec) -> str:
+    if spec.choices:
+        return ", ".join(f"`{choice}`" for choice in spec.choices)
+    if spec.low is None and spec.high is None:
+        return ""
+    low, high = ("" if limit is None else f"{limit:g}" for limit in (spec.low, spec.high))
+    return f"{low} .. {high}"
+
+
+def main() -> int:
+    """Rewrite the tables, or with --check only tell which pages are out of date (exit code 1)."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 if a table is out of date")
+    check = parser.parse_args().check
+    stale = []
+    for name, parameters in parameter_classes().items():
+        before, after = updated(name, parameters)
+        if before != after:
+            stale.append(name)
+            if not check:
+                (PAGES / f"{name}.md").write_text(after, encoding="utf-8")
+    print(f"{'out of date' if check else 'rewritten'}: {', '.join(stale) or 'none'}")
+    return 1 if check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

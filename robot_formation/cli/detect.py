@@ -1,0 +1,125 @@
+"""`formation detect`: the blocks that a Pixy2 reports of images."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from robot_formation.vision.block import Block
+    from robot_formation.vision.detector import BlockDetector
+    from robot_formation.vision.picture import Picture
+
+DESCRIPTION = """\
+Find the blocks of taught colours in images, as a Pixy2 does. Each image is taken by itself (shown twice, with block
+filtering 0), or, with --sequence, as the next frame of one sequence, with tracking.
+"""
+_FRAME_US = 16_200
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("detect", help="find blocks of taught colours in images", description=DESCRIPTION)
+    parser.add_argument(
+        "images", metavar="IMAGE", type=Path, nargs="+", help="image file, 316 x 208 (others are scaled)"
+    )
+    parser.add_argument(
+        "--signatures", metavar="FILE", type=Path, required=True, help="taught signatures, YAML or JSON"
+    )
+    parser.add_argument("--parameters", metavar="FILE", type=Path, help="detector parameters, YAML or JSON")
+    parser.add_argument("--sequence", action="store_true", help="the images are successive frames")
+    parser.add_argument(
+        "--dt-us",
+        metavar="N",
+        type=_positive,
+        default=_FRAME_US,
+        help=f"with --sequence: microseconds between frames (default: {_FRAME_US})",
+    )
+    parser.add_argument("--draw", metavar="DIR", type=Path, help="write the images with their blocks into this folder")
+    parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Detect blocks in the images, in the order given, and print them.
+
+    Raises:
+        FormationError: an image, the signatures or the parameters can't be read, or a drawing can't be written.
+    """
+    # Imported here, so that the other verbs don't pay for OpenCV.
+    import dataclasses
+    import json
+
+    from robot_formation.vision.detector import BlockDetector
+    from robot_formation.vision.files import read_parameters, read_picture
+    from robot_formation.vision.parameters import DetectorParameters
+    from robot_formation.vision.signatures import load_signatures
+
+    parameters = read_parameters(args.parameters) if args.parameters else DetectorParameters()
+    if not args.sequence:
+        parameters = dataclasses.replace(parameters, block_filtering=0)
+    detector = BlockDetector(load_signatures(args.signatures), parameters)
+    pictures = ((path, read_picture(path, _warn)) for path in args.images)
+    frames = _sequence(detector, pictures, args.dt_us) if args.sequence else _singles(detector, pictures)
+    results = []
+    for path, picture, blocks in frames:
+        results.append({"image": str(path), "blocks": [dataclasses.asdict(block) for block in blocks]})
+        if args.draw:
+            _draw(args.draw, len(results), path, picture, blocks)
+    print(json.dumps(results) if args.json else _table(results))
+    return 0
+
+
+Frame = tuple[Path, "Picture", "list[Block]"]
+
+
+def _singles(detector: BlockDetector, pictures: Iterable[tuple[Path, Picture]]) -> Iterator[Frame]:
+    """Each picture by itself: the tracker reports a box from its second frame on."""
+    for path, picture in pictures:
+        detector.reset()
+        detector.process(picture, 0)
+        yield path, picture, detector.process(picture, _FRAME_US)
+
+
+def _sequence(detector: BlockDetector, pictures: Iterable[tuple[Path, Picture]], dt_us: int) -> Iterator[Frame]:
+    for number, (path, picture) in enumerate(pictures):
+        yield path, picture, detector.process(picture, number * dt_us)
+
+
+def _draw(folder: Path, number: int, path: Path, picture: Picture, blocks: list[Block]) -> None:
+    from robot_formation.vision.files import write_drawn
+    from robot_formation.vision.picture import PictureError
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PictureError(f"{folder}: can't be made ({error.strerror}); choose another folder") from error
+    write_drawn(folder / f"{number:04d}_{path.stem}.png", picture, blocks)
+
+
+def _table(results: list[dict[str, Any]]) -> str:
+    """One line per image and one per block."""
+    lines = []
+    for result in results:
+        count = len(result["blocks"])
+        lines.append(f"{result['image']}: {count or 'no'} block{'' if count == 1 else 's'}")
+        lines += ["  " + "  ".join(f"{name} {value}" for name, value in block.items()) for block in result["blocks"]]
+    return "\n".join(lines)
+
+
+def _positive(text: str) -> int:
+    """An argparse type for a whole number above zero."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above zero")
+    return value
+
+
+def _warn(text: str) -> None:
+    print(text, file=sys.stderr)

@@ -1,0 +1,64 @@
+"""Planar motions compose like rigid transforms, and u and v mean what the paper means."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robot_formation.control.motion import Motion
+
+lengths = st.floats(-10.0, 10.0)
+angles = st.floats(-2 * math.pi, 2 * math.pi)
+motions = st.builds(Motion, lengths, lengths, angles)
+
+
+def matrix(motion):
+    """The homogeneous transform of a motion, 3 x 3."""
+    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+    return np.array([[c, -s, motion.x_m], [s, c, motion.y_m], [0.0, 0.0, 1.0]])
+
+
+@given(first=motions, second=motions)
+def test_composition_is_the_product_of_homogeneous_matrices(first, second):
+    assert matrix(first.then(second)) == pytest.approx(matrix(first) @ matrix(second), abs=1e-12)
+
+
+@given(motion=motions)
+def test_standing_still_before_or_after_changes_nothing(motion):
+    assert Motion().then(motion) == motion
+    assert motion.then(Motion()) == motion
+
+
+@given(a=motions, b=motions, c=motions)
+def test_composition_is_associative(a, b, c):
+    assert matrix(a.then(b).then(c)) == pytest.approx(matrix(a.then(b.then(c))), abs=1e-11)
+
+
+def test_a_square_driven_with_left_turns_comes_back_to_its_start():
+    side = Motion(1.0, 0.0, math.pi / 2)
+    assert matrix(side.then(side).then(side).then(side)) == pytest.approx(np.eye(3), abs=1e-12)
+
+
+def test_v_is_forward_and_u_is_to_the_right():
+    assert Motion.from_uv(u_m=0.02, v_m=0.05) == Motion(x_m=0.05, y_m=-0.02)
+
+
+@given(u=lengths, v=lengths)
+def test_u_and_v_come_back_unchanged(u, v):
+    motion = Motion.from_uv(u, v)
+    assert (motion.u_m, motion.v_m, motion.yaw_rad) == (u, v, 0.0)
+
+
+@given(motion=motions)
+def test_x_and_y_come_back_from_u_and_v(motion):
+    back = Motion.from_uv(motion.u_m, motion.v_m)
+    assert (back.x_m, back.y_m) == (motion.x_m, motion.y_m)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("component", ["x_m", "y_m", "yaw_rad"])
+def test_one_component_that_is_not_finite_makes_the_motion_not_finite(component, bad):
+    assert Motion().finite
+    assert not Motion(**{component: bad}).finite

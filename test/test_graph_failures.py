@@ -1,0 +1,118 @@
+"""What a run leaves behind when a node dies, the leader is lost or a person interrupts."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from graph_tools import Killer, alive, launch, short_scenario
+
+from robot_formation.analysis.from_bag import load_run
+from robot_formation.analysis.quantities import analyse
+from robot_formation.experiment.domain import domain_ports
+from robot_formation.experiment.shared_memory import find_orphans
+
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+
+NODES = (
+    "/world",
+    "/leader/drive",
+    "/leader/leader",
+    "/follower_1/drive",
+    "/follower_1/block_detector",
+    "/follower_1/predictor",
+    "/follower_1/fine_tuner",
+    "/recorder",
+)
+LONG = ("leader.timesteps=50",)
+
+
+def shared_memory_ports(domain):
+    """Shared-memory files that belong to a domain's ports."""
+    ports = {f"port{port}" for port in domain_ports(domain)}
+    return [name for name in os.listdir("/dev/shm") if any(name.endswith(p) or f"{p}_" in name for p in ports)]
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path, node):
+    killer = Killer(node, signal.SIGKILL, after_timesteps=2)
+    domains = []
+
+    def on_start(domain, pids):
+        domains.append(domain)
+        killer.started(domain, pids)
+
+    result = launch(short_scenario(*LONG), tmp_path / "bag", say=killer.say, on_start=on_start)
+    assert result.exit_code == 4
+    assert f"node {node} was killed by SIGKILL" in result.reason
+    assert set(killer.pids) == set(NODES)
+    assert not any(alive(pid) for pid in killer.pids.values())
+    analysis = analyse(load_run(tmp_path / "bag"))
+    # The kill falls into timestep 3 or later, as fast as the signal came; what was finished before is there.
+    assert len(analysis.followers[0].timesteps) >= 2
+    assert analysis.outcome == "incomplete"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bag"]
+    assert shared_memory_ports(domains[0]) == []
+    assert find_orphans(domains[0]) == {}
+
+
+def test_a_lost_leader_ends_the_run_in_good_order(tmp_path):
+    result = launch(short_scenario("world.camera.pan_deg=-90.0"), tmp_path / "bag")
+    assert result.exit_code == 3
+    assert "follower_1 lost its beacon neighbour in timestep 0" in result.reason
+    assert analyse(load_run(tmp_path / "bag")).outcome == "lost"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path, number):
+    bag = tmp_path / "bag"
+    command = [sys.executable, "-m", "robot_formation.cli.main", "run", "--camera", "on_demand", "--json"]
+    command += ["--set", "leader.timesteps=500", "--bag", str(bag)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        for line in process.stderr:
+            if line.startswith("timestep  2/"):
+                break
+        children = [
+            int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split() if pid
+        ]
+        assert len(children) == len(NODES)
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in errors
+    assert "Traceback" not in errors
+    assert not any(alive(pid) for pid in children)
+    assert (bag / "metadata.yaml").is_file()
+    assert len(analyse(load_run(bag)).followers[0].timesteps) >= 2
+
+
+def test_nodes_end_when_their_launcher_is_killed(tmp_path):
+    bag = tmp_path / "bag"
+    command = [sys.executable, "-m", "robot_formation.cli.main", "run", "--camera", "on_demand"]
+    command += ["--set", "leader.timesteps=500", "--bag", str(bag)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        for line in process.stderr:
+            if line.startswith("timestep  2/"):
+                break
+        children = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+        process.kill()
+        process.wait()
+    descriptors = []
+    for pid in children:
+        try:
+            descriptors.append(os.pidfd_open(pid))
+        except ProcessLookupError:
+            continue
+    for descriptor in descriptors:
+        assert _readable(descriptor, timeout_s=20.0)
+        os.close(descriptor)
+    assert (bag / "metadata.yaml").is_file()
+
+
+def _readable(descriptor, timeout_s):
+    """A process's descriptor becomes readable when it ends."""
+    import select
+
+    return bool(select.select([descriptor], [], [], timeout_s)[0])
