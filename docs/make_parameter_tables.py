@@ -65,8 +65,8 @@ def _row(spec: Spec, configured: dict[str, Any]) -> str:
     said = _value(default)
     if spec.name in configured and configured[spec.name] != default:
         said += f"; {_value(configured[spec.name])} in config"
-    description = spec.description[:1].upper() + spec.description[1:]
-    cells = (f"`{spec.name}`", _TYPES[spec.type], spec.unit, said, _range(spec), description.replace("|", "\\|"))
+    description = spec.description.replace("|", "\\|")
+    cells = (f"`{spec.name}`", _TYPES[spec.type], spec.unit, said, _range(spec), description)
     return "| " + " | ".join(cells) + " |"
 
 
@@ -85,7 +85,7 @@ def _range(spec: Spec) -> str:
         return ", ".join(f"`{choice}`" for choice in spec.choices)
     if spec.low is None and spec.high is None:
         return ""
-    low, high = ("" if limit is None else f"{limit:g}" for limit in (spec.low, spec.high))
+    low, high = ("" if limit is None else f"{limit:.12g}" for limit in (spec.low, spec.high))
     return f"{low} .. {high}"
 
 

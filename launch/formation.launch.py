@@ -1,15 +1,15 @@
-"""Start a run's nodes on a ROS 2 install: ros2 launch robot_formation formation.launch.py track:=two predictor:=measured.
+"""Start a run's nodes on a ROS 2 install, with the arguments below: ros2 launch robot_formation formation.launch.py.
 
 The nodes come from the same table as those of `formation run` (robot_formation/launching/processes.py).
 """
 
 from pathlib import Path
 
-from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable, Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from launch import LaunchContext, LaunchDescription
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.launching.processes import processes
 
@@ -60,6 +60,8 @@ def nodes(context: LaunchContext) -> list[Node]:
 
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments, keep discovery on this machine unless told otherwise, and start the nodes."""
-    arguments = [DeclareLaunchArgument(name, default_value=d, description=text) for name, (d, text) in ARGUMENTS.items()]
+    arguments = [
+        DeclareLaunchArgument(name, default_value=d, description=text) for name, (d, text) in ARGUMENTS.items()
+    ]
     discovery = SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", LaunchConfiguration("discovery_range"))
     return LaunchDescription([*arguments, discovery, OpaqueFunction(function=nodes)])

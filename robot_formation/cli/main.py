@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import robot_formation
-from robot_formation.cli import analyze, doctor, list_, run, test
+from robot_formation.cli import analyze, detect, doctor, list_, run, teach, test
 from robot_formation.errors import FormationError
 
-VERBS = (run, list_, analyze, doctor, test)
+VERBS = (run, list_, analyze, teach, detect, doctor, test)
 BAD_INPUT_EXIT_CODE = 2
 INTERRUPTED_EXIT_CODE = 130
 

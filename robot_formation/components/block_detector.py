@@ -16,6 +16,7 @@ from robot_formation.paths import config_dir
 from robot_formation.vision.detector import BlockDetector
 from robot_formation.vision.parameters import DetectorParameters
 from robot_formation.vision.signatures import load_signatures
+from robot_formation.vision.tracking import ClockError
 
 WIDTH_PX, HEIGHT_PX = 316, 208
 
@@ -70,9 +71,15 @@ class BlockDetectorComponent(Component):
                 self._scaled = True
                 self.warn(f"pictures of {pixels.shape[1]} x {pixels.shape[0]} are scaled to {WIDTH_PX} x {HEIGHT_PX}")
             pixels = np.asarray(cv2.resize(pixels, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        stamp_ns = conversions.stamp_of(message)
+        try:
+            blocks = self._detector.process(pixels, stamp_ns // 1000)
+        except ClockError as error:
+            self._dropped += 1
+            self.warn(str(error))
+            return
         self._frames += 1
-        self.stamp_ns = conversions.stamp_of(message)
-        blocks = self._detector.process(pixels, self.stamp_ns // 1000)
+        self.stamp_ns = stamp_ns
         frame = message.header.frame_id
         self._send(names.BLOCKS, conversions.blocks(blocks, frame, self.stamp_ns))
         if self._image_wanted:

@@ -81,8 +81,10 @@ class Launcher:
                 environment = node_environment(domain, folder)
                 result.exit_code, result.reason = self._drive(folder, environment, result)
             finally:
+                ended = time.monotonic()
+                result.running_s = ended - began - result.startup_s
                 self._stop()
-                result.running_s = time.monotonic() - began - result.startup_s
+                result.stopping_s = time.monotonic() - ended
                 result.usage = {child.name: child.usage for child in self._children if child.usage}
                 result.warnings = [text for child in self._children for text in child.warnings()]
                 self._rescue_bag(result)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import pybullet
-
 from robot_formation.surface import Surface
+from robot_formation.world.bullet import pybullet
 from robot_formation.world.events import BodyState
 from robot_formation.world.imperfections import Imperfections
 from robot_formation.world.parameters import WorldParameters

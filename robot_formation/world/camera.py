@@ -41,6 +41,7 @@ class Camera:
         self._lens = np.array([p.x_m, p.y_m, p.z_m])
         self._canvas = np.empty((p.height_px * SUPERSAMPLING, p.width_px * SUPERSAMPLING, 3), np.uint16)
         self._levels = _level_table(p.gamma)
+        self._bounds = _view_bounds(p)
 
     def optical_frame(self, robot: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotation (3, 3) from the world to the optical frame (x right, y down, z ahead) and the lens's place (3,)."""
@@ -86,10 +87,9 @@ class Camera:
         depths = local[corners, 2]
         ahead = depths.min(axis=1) >= near
         outline = drawn[corners]
-        low, high = outline.min(axis=1), outline.max(axis=1)
-        rows, columns, _ = self._canvas.shape
-        inside = (high >= 0).all(axis=1) & (low <= np.array([columns, rows]) << SHIFT).all(axis=1)
-        shown = np.flatnonzero((depths.max(axis=1) >= near) & (inside | ~ahead))
+        # A patch with all corners behind one of the planes that bound the view can't be seen.
+        hidden = (local @ self._bounds.T < 0.0)[corners].all(axis=1).any(axis=1)
+        shown = np.flatnonzero((depths.max(axis=1) >= near) & ~hidden)
         for index in shown[np.argsort(-depths[shown].mean(axis=1), kind="stable")].tolist():
             colour = self._scene.patch_light[index]
             if ahead[index]:
@@ -114,6 +114,18 @@ class Camera:
         # Sample centres lie a quarter pixel around pixel centres; far-off corners stay inside OpenCV's integers.
         fixed = np.clip((pixels * SUPERSAMPLING + 0.5) * (1 << SHIFT), -1e8, 1e8)
         return np.rint(fixed).astype(np.int32)
+
+
+def _view_bounds(parameters: CameraParameters) -> NDArray[np.float64]:
+    """Inward normals (4, 3) of the planes through the lens that bound the view: left, right, top, bottom.
+
+    They leave a margin of two pixels, so that nothing at the picture's edge is taken for hidden.
+    """
+    p, margin = parameters, 2.5
+    left, top = p.centre_x_px + margin, p.centre_y_px + margin
+    right, bottom = p.width_px - 1 - p.centre_x_px + margin, p.height_px - 1 - p.centre_y_px + margin
+    f = p.focal_length_px
+    return np.array([[f, 0.0, left], [-f, 0.0, right], [0.0, f, top], [0.0, -f, bottom]])
 
 
 def clip_near(corners: NDArray[np.float64], near: float) -> NDArray[np.float64]:

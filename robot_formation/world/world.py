@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
+from robot_formation.world.bullet import pybullet
 from robot_formation.world.camera import Camera, Picture, Sensor
 from robot_formation.world.events import BodyState, Event, Frame, RobotPose
 from robot_formation.world.parameters import WorldParameters

@@ -1,0 +1,122 @@
+"""What a run of track two costs: wall time, real-time factor, share by node, memory, bag size.
+
+In both camera modes through the node graph and in one process, each several times; the median is printed. The aims are
+those of the project: `stream` at 5 times real time, `on_demand` at 15, in process below 2 seconds.
+
+Run: python bench/run.py [--rounds N] [--json]
+"""
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from robot_formation.analysis.from_bag import load_run
+from robot_formation.experiment import scenario as scenarios
+from robot_formation.launching.launcher import Launcher
+
+AIMS = {"stream": 5.0, "on_demand": 15.0}
+IN_PROCESS = """
+import resource, sys, time
+from pathlib import Path
+from robot_formation.experiment import scenario as scenarios
+from robot_formation.experiment.in_process import run_in_process
+from robot_formation.launching.processes import run_metadata
+scenario = scenarios.override(scenarios.load_track("two"), [f"world.camera.mode={sys.argv[2]}"])
+result = run_in_process(scenario, Path(sys.argv[1]), run_metadata(scenario))
+print(result.running_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
+sys.exit(result.exit_code)
+"""
+
+
+def size_mb(bag):
+    return sum(path.stat().st_size for path in bag.iterdir()) / 1e6
+
+
+def through_the_graph(mode, folder):
+    scenario = scenarios.override(scenarios.load_track("two"), [f"world.camera.mode={mode}"])
+    bag = folder / "bag"
+    began = time.monotonic()
+    result = Launcher(scenario, bag).run()
+    wall_s = time.monotonic() - began
+    if result.exit_code != 0:
+        raise SystemExit(f"the run ended with {result.exit_code}: {result.reason}")
+    simulated_s = load_run(bag).simulated_s
+    processor_s = sum(usage.processor_s for usage in result.usage.values())
+    return {
+        "wall_s": wall_s,
+        "startup_s": result.startup_s,
+        "stopping_s": result.stopping_s,
+        "driving_s": result.running_s,
+        "simulated_s": simulated_s,
+        "real_time_factor": simulated_s / result.running_s,
+        "processor_s": processor_s,
+        "share": {name: usage.processor_s / processor_s for name, usage in result.usage.items()},
+        "peak_memory_mb": sum(usage.peak_memory_mb for usage in result.usage.values()),
+        "bag_mb": size_mb(bag),
+    }
+
+
+def in_process(mode, folder):
+    bag = folder / "bag"
+    began = time.monotonic()
+    completed = subprocess.run(
+        [sys.executable, "-c", IN_PROCESS, bag, mode], capture_output=True, text=True, check=True
+    )
+    wall_s = time.monotonic() - began
+    driving_s, memory_mb = map(float, completed.stdout.split())
+    simulated_s = load_run(bag).simulated_s
+    return {
+        "wall_s": wall_s,
+        "driving_s": driving_s,
+        "simulated_s": simulated_s,
+        "real_time_factor": simulated_s / driving_s,
+        "peak_memory_mb": memory_mb,
+        "bag_mb": size_mb(bag),
+    }
+
+
+def median_of(rounds):
+    found = {name: statistics.median(r[name] for r in rounds) for name in rounds[0] if name != "share"}
+    if "share" in rounds[0]:
+        found["share"] = {n: statistics.median(r["share"][n] for r in rounds) for n in rounds[0]["share"]}
+    return found
+
+
+def measure(rounds):
+    ways = {(way.__name__, mode): way for way in (through_the_graph, in_process) for mode in AIMS}
+    found = {key: [] for key in ways}
+    for _ in range(rounds):
+        for (name, mode), way in ways.items():
+            with tempfile.TemporaryDirectory() as folder:
+                found[name, mode].append(way(mode, Path(folder)))
+    return {f"{name} {mode}": median_of(values) for (name, mode), values in found.items()}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    found = measure(args.rounds)
+    if args.json:
+        print(json.dumps(found, indent=2))
+        return
+    columns = ("wall_s", "startup_s", "driving_s", "stopping_s", "simulated_s", "real_time_factor", "processor_s")
+    columns += ("peak_memory_mb", "bag_mb")
+    print(f"{'':28}" + "".join(f"{name:>18}" for name in columns))
+    for name, values in found.items():
+        print(f"{name:28}" + "".join(f"{values[c]:18.2f}" if c in values else f"{'-':>18}" for c in columns))
+    for mode, aim in AIMS.items():
+        factor = found[f"through_the_graph {mode}"]["real_time_factor"]
+        print(f"{mode}: {factor:.1f} times real time, {factor / aim:.2f} of the aim of {aim:g}")
+        shares = sorted(found[f"through_the_graph {mode}"]["share"].items(), key=lambda item: -item[1])
+        print("  processor time: " + ", ".join(f"{name} {share:.0%}" for name, share in shares))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,167 @@
+"""`formation run` and its relatives as a person types them: exit codes, one-line errors, nothing overwritten."""
+
+import json
+import sys
+
+import pytest
+from graph_tools import formation, json_of
+
+from robot_formation.bag.reader import read_bag
+from robot_formation.cli.main import main
+
+FAST = ("--camera", "on_demand", "--in-process")
+
+
+def complaint(capsys, *arguments):
+    """Call a verb that must fail on its arguments; return the one line that it prints."""
+    try:
+        code = main([str(argument) for argument in arguments])
+    except SystemExit as leave:  # argparse ends so
+        code = leave.code
+    captured = capsys.readouterr()
+    assert code == 2
+    assert captured.out == ""
+    lines = captured.err.strip().splitlines()
+    assert "Traceback" not in captured.err
+    return lines[-1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "--track", "tow"), ["no track 'tow'", "'two'"]),
+        (("run", "--predictor", "mesured"), ["'mesured'", "'measured'"]),
+        (("run", "--surface", "bowel"), ["no surface 'bowel'", "'bowl'"]),
+        (("run", "--camera", "streem"), ["'streem'", "'stream'"]),
+        (("run", "--set", "predictor.forgeting=0.9"), ["'forgeting'", "'forgetting'"]),
+        (("run", "--set", "predicter.forgetting=0.9"), ["'predicter'", "'predictor'"]),
+        (("run", "--set", "predictor.forgetting=2"), ["forgetting", "outside 0.01 to 1.0"]),
+        (("run", "--set", "predictor.forgetting=often"), ["forgetting", "float"]),
+        (("run", "--set", "leader.timesteps"), ["KEY=VALUE"]),
+        (("run", "--set", "sed=3"), ["'sed'", "'seed'"]),
+        (("run", "--set", "world.camera.frame_rate_hz=31"), ["frame_rate_hz", "240"]),
+        (("run", "--set", "world.surface_parameters=[depth=1]"), ["depth"]),
+        (("run", "--seed", "-1"), ["seed"]),
+        (("run", "--real-time-factor", "-1"), ["real_time_factor"]),
+        (("run", "--track", "one", "--scenario", "x.yaml"), ["not allowed with"]),
+        (("run", "--scenario", "missing.yaml"), ["missing.yaml", "No such file"]),
+        (("rnu",), ["invalid choice"]),
+        (("analyze", "missing_bag"), ["missing_bag"]),
+        (("analyze", __file__), ["bag"]),
+    ],
+)
+def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(capsys, arguments, words):
+    line = complaint(capsys, *arguments)
+    for word in words:
+        assert word in line
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("leader: {timestep: 3}", ["'timestep'", "'timesteps'"]),
+        ("leeder: {timesteps: 3}", ["'leeder'", "'leader'"]),
+        ("leader: 3", ["leader"]),
+        ("[1, 2]", ["mapping"]),
+        ("a: [1", ["YAML", "line"]),
+        ("seed: !!python/object/apply:os.system ['true']", ["YAML"]),
+    ],
+)
+def test_a_bad_scenario_file_is_named(capsys, tmp_path, text, words):
+    file = tmp_path / "scenario.yaml"
+    file.write_text(text)
+    line = complaint(capsys, "run", "--scenario", file)
+    for word in [*words, str(file)]:
+        assert word in line
+
+
+def test_nothing_is_overwritten(capsys, tmp_path):
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    (bag / "precious").write_text("data")
+    assert "exists already" in complaint(capsys, "run", "--bag", bag)
+    assert (bag / "precious").read_text() == "data"
+    (tmp_path / "other.partial").mkdir()
+    assert "exists already" in complaint(capsys, "run", "--bag", tmp_path / "other", "--in-process")
+
+
+def test_a_bag_that_cannot_be_written_is_said(capsys, tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "file" in complaint(capsys, "run", "--in-process", "--bag", tmp_path / "file" / "bag")
+
+
+@pytest.mark.parametrize("track", ["one", "two"])
+@pytest.mark.parametrize("predictor", ["previous", "literal", "measured"])
+def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(tmp_path, track, predictor):
+    bag = tmp_path / "bag"
+    completed = formation("run", "--track", track, "--predictor", predictor, "--seed", 3, "--bag", bag, "--json", *FAST)
+    assert completed.returncode in (0, 3), completed.stderr
+    run = json_of(completed)
+    assert run["outcome"] == ("done" if completed.returncode == 0 else "lost")
+    if completed.returncode == 0:
+        assert [row["t"] for row in run["timesteps"]] == list(range(1, (15 if track == "one" else 20) + 1))
+    assert (bag / "metadata.yaml").is_file()
+    assert json_of(formation("analyze", bag, "--json")) == run
+
+
+def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_path):
+    from mcap.reader import make_reader
+
+    bag = tmp_path / "bag"
+    options = ("--camera", "on_demand", "--set", "leader.timesteps=3", "--json")
+    completed = formation("run", "--bag", bag, *options)
+    assert completed.returncode == 0, completed.stderr
+    assert len(json_of(completed)["timesteps"]) == 3
+    assert "timestep  3/3" in completed.stderr
+    with (bag / "bag_0.mcap").open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        assert reader.get_header().profile == "ros2"
+        assert all(schema.encoding == "ros2msg" and schema.data for schema in summary.schemas.values())
+        by_mcap = sum(1 for _ in reader.iter_messages())
+    with read_bag(bag) as opened:
+        assert by_mcap == opened.message_count
+        assert "/follower_1/blocks" in opened.topics
+        assert "/follower_1/camera/image_raw" not in opened.topics
+        assert opened.metadata("robot_formation")["predictor"] == "measured"
+
+
+def test_images_are_recorded_on_request(tmp_path):
+    bag = tmp_path / "bag"
+    options = ("--camera", "on_demand", "--set", "leader.timesteps=1", "--images", "--json")
+    assert formation("run", "--bag", bag, *options).returncode == 0
+    with read_bag(bag) as opened:
+        counts = {
+            topic: len(list(opened.messages([topic])))
+            for topic in ("/follower_1/camera/image_raw", "/follower_1/blocks")
+        }
+    assert counts["/follower_1/camera/image_raw"] == counts["/follower_1/blocks"] > 0
+
+
+def test_without_json_the_table_and_the_pictures_are_there(tmp_path):
+    bag = tmp_path / "bag"
+    completed = formation("run", "--bag", bag, "--set", "leader.timesteps=4", *FAST)
+    assert completed.returncode == 0, completed.stderr
+    assert "outcome: done" in completed.stdout
+    assert {path.name for path in (tmp_path / "bag_analysis").iterdir()} == {"trajectory.png", "corrections.png"}
+
+
+def test_list_names_what_run_takes(capsys):
+    assert main(["list", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {"one", "two"} <= set(found["tracks"])
+    assert {"bowl", "plane"} <= set(found["surfaces"])
+    assert {"previous", "literal", "measured"} <= set(found["predictors"])
+    assert main(["list", "predictors"]) == 0
+    assert "measured" in capsys.readouterr().out
+
+
+def test_a_closed_pipe_is_no_error(tmp_path):
+    import subprocess
+
+    command = [sys.executable, "-m", "robot_formation.cli.main", "list"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        errors = process.stderr.read()
+        process.wait()
+    assert b"Traceback" not in errors
