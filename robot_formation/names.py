@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from robot_formation.errors import FormationError
+
 LEADER = "leader"
 FORMATION = "/formation"
 
@@ -57,11 +59,11 @@ def beacon_neighbour(robot: str) -> str:
     """Name the robot on a follower's left, which it keeps its place beside.
 
     Raises:
-        ValueError: if the robot is no follower.
+        FormationError: if the robot is no follower.
     """
     prefix, _, number = robot.partition("_")
     if prefix != "follower" or not number.isdigit() or int(number) < 1:
-        raise ValueError(f"'{robot}' is no follower: followers are called follower_1, follower_2, ...")
+        raise FormationError(f"'{robot}' is no follower: followers are called follower_1, follower_2, ...")
     return LEADER if number == "1" else follower(int(number) - 1)
 
 

@@ -1,5 +1,7 @@
 """Online DMD equals batch least squares, recovers what is known, and survives data that say nothing."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -47,7 +49,7 @@ def test_k_equals_batch_least_squares_after_every_update(dimension, forgetting, 
 def test_k_equals_batch_least_squares_in_a_long_run_of_displacements(forgetting):
     rng = np.random.default_rng(3)
     xs = np.array([0.01, 0.05]) + rng.normal(0.0, 0.01, (200, 2))
-    pairs = list(zip(xs[:-1], xs[1:], strict=True))
+    pairs = list(itertools.pairwise(xs))
     dmd = OnlineDMD(2, forgetting=forgetting)
     for number, (x, y) in enumerate(pairs, start=1):
         dmd.update(x, y)
@@ -152,6 +154,7 @@ POOR = {
     "collinear": [DIRECTION * (1.0 + 0.1 * np.sin(n)) for n in range(30)],
     "zero": [np.zeros(2)] * 30,
     "collinear with zeros": [DIRECTION * (n % 3) for n in range(30)],
+    "tiny": [np.array([0.0, 8e-178]), np.array([8e-178, 0.0])] * 5,
     "rounded collinear": [DIRECTION * 0.9**n + 1e-14 * np.sin([n, 2.0 * n]) for n in range(30)],
 }
 
@@ -160,7 +163,7 @@ POOR = {
 @pytest.mark.parametrize("history", POOR.values(), ids=POOR.keys())
 def test_data_without_full_rank_give_the_finite_pseudo_inverse_solution(history, forgetting):
     dmd = OnlineDMD(2, forgetting=forgetting)
-    for number, (x, y) in enumerate(zip(history[:-1], history[1:], strict=True), start=1):
+    for number, (x, y) in enumerate(itertools.pairwise(history), start=1):
         dmd.update(x, y)
         assert not dmd.started
         assert dmd.condition_number == float("inf")

@@ -86,6 +86,7 @@ class OnlineDMD:
         ys = np.column_stack([pair[1] for pair in self._pairs]) * weights
         self.k = ys @ np.linalg.pinv(xs, rcond=1.0 / _MAX_CONDITION)
         singular = np.linalg.svd(xs, compute_uv=False)
-        if len(singular) == self.k.shape[0] and singular[-1] * _MAX_CONDITION > singular[0] > 0.0:
+        smallest = max(singular[0] / _MAX_CONDITION, _MAX_P**-0.5)
+        if len(singular) == self.k.shape[0] and singular[-1] > smallest:
             self._p = np.linalg.inv(xs @ xs.T)
             self._pairs.clear()

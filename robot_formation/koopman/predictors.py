@@ -19,6 +19,11 @@ from robot_formation.parameters import parameter, suggestion
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+# Nothing moves or is measured so finely: what is less is rounding, and dividing by it makes no sense.
+_FINEST_M = 1e-9
+# An open-loop power of K may grow as it likes; this is far beyond any forecast and far below overflow.
+_LARGEST_STATE_M = 1e100
+
 
 @dataclass(frozen=True)
 class PredictorParameters:
@@ -103,7 +108,7 @@ class Literal:
     def observe(self, x: Vector) -> None:
         """See `Model`; from the fourth on only the number of observations matters."""
         if self._k is not None:
-            self._state = self._k @ self._state
+            self._state = np.clip(self._k @ self._state, -_LARGEST_STATE_M, _LARGEST_STATE_M)
             return
         self._collected.append(x)
         self._state = x
@@ -202,6 +207,7 @@ class Predictor:
             raise PredictionError(f"refused the displacement (u {u_m}, v {v_m}): not finite")
         if (np.abs(x) > limit).any():
             raise PredictionError(f"refused the displacement (u {u_m}, v {v_m}) m: no robot goes so far in a timestep")
+        x[np.abs(x) < _FINEST_M] = 0.0
         if self._expected is not None:
             error = x - self._expected
             self._errors = self._errors + np.outer(error, error)
