@@ -32,7 +32,7 @@ def inverse_kinematics(x, y, yaw):
 
 
 def joints(x, y, yaw):
-    """Angles of all six joints after a rigid motion at constant rates; the sensing wheels' contact points move along."""
+    """Angles of all six joints after a rigid motion at constant rates; sensing wheels measure at their own places."""
     v_wheel = x - yaw * P.encoder_v_offset_m
     u_wheel = y + yaw * P.encoder_u_offset_m
     return (*inverse_kinematics(x, y, yaw), v_wheel / P.encoder_radius_m, u_wheel / P.encoder_radius_m)
