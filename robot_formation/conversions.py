@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, Pose, PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message, serialize_message
@@ -246,15 +246,30 @@ def pose_of(odometry_message: Odometry) -> PoseStamped:
     return PoseStamped(header=odometry_message.header, pose=odometry_message.pose.pose)
 
 
+def place(position: Sequence[float], frame: str, stamp_ns: int) -> PoseStamped:
+    """Make a pose of which only the place (x, y, z) is known: its orientation is the frame's."""
+    message = PoseStamped(header=header(stamp_ns, frame))
+    p = message.pose.position
+    p.x, p.y, p.z = map(float, position)
+    return message
+
+
+def pose_array(poses: Sequence[PoseStamped], frame: str, stamp_ns: int) -> PoseArray:
+    """Make one message of several poses."""
+    return PoseArray(header=header(stamp_ns, frame), poses=[stamped.pose for stamped in poses])
+
+
 def path(poses: Sequence[PoseStamped], frame: str, stamp_ns: int) -> Path:
     """Make a path."""
     return Path(header=header(stamp_ns, frame), poses=list(poses))
 
 
 def image(pixels: NDArray[np.uint8], frame: str, stamp_ns: int) -> Image:
-    """Make an rgb8 image from (height, width, 3)."""
+    """Make an rgb8 image from (height, width, 3), a mono8 one from (height, width)."""
     height, width = pixels.shape[:2]
-    message = Image(header=header(stamp_ns, frame), height=height, width=width, encoding="rgb8", step=3 * width)
+    encoding, channels = ("mono8", 1) if pixels.ndim == 2 else ("rgb8", 3)
+    message = Image(header=header(stamp_ns, frame), height=height, width=width, encoding=encoding)
+    message.step = channels * width
     # Assigning an array('B') is checked in 0.1 ms, a list in 4 ms.
     message.data = array.array("B", pixels.tobytes())
     return message
@@ -264,23 +279,43 @@ def read_image(message: Image) -> NDArray[np.uint8]:
     """Read an rgb8 or bgr8 image, padded rows included, as RGB (height, width, 3)."""
     if message.encoding not in ("rgb8", "bgr8"):
         raise MessageError(f"image encoding '{message.encoding}' has no colour to find blocks by; send rgb8 or bgr8")
+    pixels = _rows(message, 3)
+    return pixels[:, :, ::-1] if message.encoding == "bgr8" else pixels
+
+
+def read_grey_image(message: Image) -> NDArray[np.uint8]:
+    """Read a mono8, rgb8 or bgr8 image, padded rows included, as grey levels (height, width)."""
+    if message.encoding == "mono8":
+        return _rows(message, 1)[:, :, 0]
+    if message.encoding not in ("rgb8", "bgr8"):
+        raise MessageError(f"image encoding '{message.encoding}' can't be read; send mono8, rgb8 or bgr8")
+    weights = np.array([0.299, 0.587, 0.114])
+    return np.asarray(np.rint(read_image(message) @ weights), np.uint8)
+
+
+def _rows(message: Image, channels: int) -> NDArray[np.uint8]:
     height, width, step = int(message.height), int(message.width), int(message.step)
-    if height < 1 or width < 1 or step < 3 * width or len(message.data) < step * height:
+    if height < 1 or width < 1 or step < channels * width or len(message.data) < step * height:
         raise MessageError(
             f"image of {width} x {height}, step {step}, has {len(message.data)} bytes: cut off or mis-sized"
         )
     rows = np.frombuffer(message.data, dtype=np.uint8, count=step * height).reshape(height, step)
-    pixels = rows[:, : 3 * width].reshape(height, width, 3)
-    return pixels[:, :, ::-1] if message.encoding == "bgr8" else pixels
+    return rows[:, : channels * width].reshape(height, width, channels)
 
 
 def camera_info(
-    width: int, height: int, focal_px: float, centre_px: tuple[float, float], frame: str, stamp_ns: int
+    width: int,
+    height: int,
+    focal_px: float,
+    centre_px: tuple[float, float],
+    frame: str,
+    stamp_ns: int,
+    distortion: Sequence[float] = (0.0, 0.0, 0.0, 0.0, 0.0),
 ) -> CameraInfo:
-    """Make the calibration of a pinhole camera without distortion."""
+    """Make a camera's calibration; distortion is k1, k2, p1, p2, k3 of OpenCV's model."""
     cx, cy = centre_px
     message = CameraInfo(header=header(stamp_ns, frame), height=height, width=width, distortion_model="plumb_bob")
-    message.d = [0.0] * 5
+    message.d = list(distortion)
     message.k = [focal_px, 0.0, cx, 0.0, focal_px, cy, 0.0, 0.0, 1.0]
     message.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
     message.p = [focal_px, 0.0, cx, 0.0, 0.0, focal_px, cy, 0.0, 0.0, 0.0, 1.0, 0.0]

@@ -17,6 +17,7 @@ WORLD_FRAME = "world"
 BASE_FRAME = "base_link"
 ODOM_FRAME = "odom"
 OPTICAL_FRAME = "camera_optical_frame"
+OVERHEAD_FRAME = "overhead_camera_optical_frame"
 
 
 @dataclass(frozen=True)
@@ -112,12 +113,30 @@ def ground_truth_path(robot: str) -> Topic:
     return Topic(f"ground_truth/{robot}/path", "nav_msgs/msg/Path", LATCHED)
 
 
+def left_plate() -> Topic:
+    """Name of the robot whose reference dot has left the plate."""
+    return Topic("ground_truth/left_plate", "std_msgs/msg/String", HISTORY)
+
+
+def robot_description(robot: str) -> Topic:
+    """A robot's URDF, for viewers; link names are without the robot's name."""
+    return Topic(under(robot, "robot_description"), "std_msgs/msg/String", LATCHED)
+
+
+def overhead_path(robot: str) -> Topic:
+    """Where the overhead camera has seen a robot's reference dot so far."""
+    return Topic(f"overhead/{robot}/path", "nav_msgs/msg/Path", LATCHED)
+
+
 def formation_done(robot: str, formation: str = FORMATION, *, listeners: int = 1) -> Topic:
     """The bare tick of a robot: the number of the timestep that it has finished."""
     return Topic(f"{formation}/{robot}/done", "std_msgs/msg/UInt32", HISTORY, listeners)
 
 
 SURFACE = Topic("surface", "visualization_msgs/msg/Marker", LATCHED)
+OVERHEAD_IMAGE = Topic("overhead/image_raw", "sensor_msgs/msg/Image", listeners=1)
+OVERHEAD_INFO = Topic("overhead/camera_info", "sensor_msgs/msg/CameraInfo", LATCHED)
+OVERHEAD_POSES = Topic("overhead/poses", "geometry_msgs/msg/PoseArray")
 CLOCK_TOPIC = Topic("/clock", "rosgraph_msgs/msg/Clock", CLOCK)
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", STATUS)
 MOVE = Topic("move", "geometry_msgs/msg/PoseStamped", listeners=1)
@@ -129,3 +148,6 @@ DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStampe
 RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
 PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
 ALIGNMENT = Topic("alignment", "std_msgs/msg/String", HISTORY)
+# Only in bags, where the recorder makes them of ground truth and robot descriptions: tf2_msgs is not on pip.
+TF = Topic("/tf", "tf2_msgs/msg/TFMessage")
+TF_STATIC = Topic("/tf_static", "tf2_msgs/msg/TFMessage", LATCHED)

@@ -47,6 +47,11 @@ def default_bags_dir() -> Path:
     return (project_root() or Path.cwd()) / "bags"
 
 
+def default_calibrations_dir() -> Path:
+    """Say where calibrations are written unless told otherwise: the checkout's calibrations/, else ./calibrations."""
+    return (project_root() or Path.cwd()) / "calibrations"
+
+
 def _candidates() -> Iterator[Path]:
     """List where share_dir may be, nearest first."""
     root = project_root()

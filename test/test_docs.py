@@ -31,6 +31,7 @@ EDGE = re.compile(r'^  (\w+) -- "([^"]+)" --> (\w+)$', re.MULTILINE)
 # The boxes of the README's graph: executable and robot.
 BOXES = {
     "world": ("world", ""),
+    "overhead_tracker": ("overhead_tracker", ""),
     "leader": ("leader", "leader"),
     "leader_drive": ("drive", "leader"),
     **{kind: (kind, "follower_1") for kind in ("drive", "block_detector", "fine_tuner", "predictor")},
@@ -61,7 +62,7 @@ def as_documented(topic, kind, robot):
         name = name.replace(f"/formation/{robot}/", "/formation/<robot>/")
     if kind == "leader":
         name = re.sub(r"/formation/follower_\d+/", "/formation/<follower>/", name)
-    if kind == "world":
+    if kind in ("world", "overhead_tracker"):
         name = re.sub(r"(^|/)(leader|follower_\d+)/", r"\1<robot>/", name)
     return name
 

@@ -18,6 +18,7 @@ pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
 
 NODES = (
     "/world",
+    "/overhead_tracker",
     "/leader/drive",
     "/leader/leader",
     "/follower_1/drive",

@@ -126,6 +126,7 @@ def alone(name, namespace, *arguments, tmp_path):
         ("block_detector", "/follower_1", ["-p", "signatures_file:=nowhere.yaml"], ["nowhere.yaml"]),
         ("predictor", "/follower_1", ["-p", "name:=mesured"], ["'mesured'", "'measured'"]),
         ("fine_tuner", "/follower_1", ["-p", "look.frame:=3"], ["'look.frame'", "'look.frames'"]),
+        ("overhead_tracker", "/", ["-p", "calibration:=goud"], ["'goud'", "'good'"]),
         ("recorder", "/", [], ["path"]),
         ("drive", "/", [], ["namespace"]),
         ("fine_tuner", "/somebody", [], ["'somebody'", "follower_1"]),

@@ -71,6 +71,7 @@ def test_both_start_the_same_nodes(launch_file, tmp_path):
     assert [(executable, namespace) for executable, namespace, _ in ours] == [
         ("recorder", "/"),
         ("world", "/"),
+        ("overhead_tracker", "/"),
         ("drive", "/leader"),
         ("drive", "/follower_1"),
         ("drive", "/follower_2"),
@@ -114,3 +115,8 @@ def test_parameters_survive_the_way_through_a_ros_parameter_file(tmp_path):
     for process in processes(scenarios.load_track("two"), Path("bag")):
         text = yaml.safe_dump({"/**": {"ros__parameters": process.ros_parameters()}})
         assert yaml.safe_load(text)["/**"]["ros__parameters"] == process.ros_parameters()
+
+
+def test_without_the_overhead_camera_its_tracker_is_not_started():
+    scenario = scenarios.override(scenarios.load_track("two"), ["world.overhead.enabled=false"])
+    assert "overhead_tracker" not in {process.executable for process in processes(scenario, None)}

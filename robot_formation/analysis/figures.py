@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.analysis.errors import AnalysisError
+from robot_formation.analysis.drawing import new_figure, save_figure
 from robot_formation.analysis.quantities import Corrections, FollowerAnalysis, RunAnalysis
 from robot_formation.analysis.record import Ground, RunRecord, Track
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
@@ -45,12 +45,16 @@ def draw_trajectory(record: RunRecord, analysis: RunAnalysis, path: str | Path) 
     for number, robot in enumerate(record.tracks):
         colour = _LEADER_COLOUR if robot == LEADER else _FOLLOWER_COLOURS[(number - 1) % len(_FOLLOWER_COLOURS)]
         _path(axes, record.tracks[robot], stops.get(robot, []), colour, robot.replace("_", " "))
+    seen = [track.seen_m[:, :2] for track in record.overhead.values()]
+    if seen:
+        style = {"color": "black", "markersize": 5, "markeredgewidth": 0.7}
+        _mark(axes, list(np.concatenate(seen)), marker="+", label="seen from above (dot)", **style)
     _ends(axes, record, analysis)
     # Contour lines end at the plate's edges, which then are the picture's.
     axes.margins(0.1 if record.ground is None else 0.0)
     axes.set(xlabel="x (cm)", ylabel="y (cm)", aspect="equal", title=_title(record, analysis))
     figure.legend(loc="outside lower center", ncols=6, frameon=False, fontsize=9, columnspacing=1.4)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def draw_corrections(record: RunRecord, analysis: RunAnalysis, path: str | Path) -> Path:
@@ -75,16 +79,11 @@ def draw_corrections(record: RunRecord, analysis: RunAnalysis, path: str | Path)
     handles, labels = np.atleast_1d(panels)[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
     figure.suptitle(_title(record, analysis), fontsize=12)
-    return _save(figure, path)
+    return save_figure(figure, path)
 
 
 def _figure(width: float, height: float, rows: int = 1) -> tuple[Any, Any]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    # No pyplot: it would choose a backend and keep every figure alive.
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(width, height)
     return figure, figure.subplots(rows, 1, sharex=True)
 
 
@@ -164,11 +163,3 @@ def _title(record: RunRecord, analysis: RunAnalysis) -> str:
     parts += [f"seed {details['seed']}"] if details.get("seed") else []
     parts += [analysis.outcome] if analysis.outcome != "done" else []
     return " · ".join(parts)
-
-
-def _save(figure: Any, path: str | Path) -> Path:
-    try:
-        figure.savefig(path, dpi=150)
-    except OSError as error:
-        raise AnalysisError(f"{path} can't be written: {error.strerror or error}; choose another folder") from error
-    return Path(path)

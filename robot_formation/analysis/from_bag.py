@@ -6,6 +6,7 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from robot_formation import names
 from robot_formation.analysis.errors import AnalysisError
-from robot_formation.analysis.record import FollowerRecord, Ground, RunRecord, Stamped, Track
+from robot_formation.analysis.record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
 from robot_formation.bag.reader import Bag, read_bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.control.motion import Motion
@@ -48,14 +49,16 @@ def run_record(bag: Bag) -> RunRecord:
         messages[message.topic].append(message.message)
     markers = messages[_absolute(names.SURFACE.name)]
     tracks = {robot: _track(messages[_absolute(names.ground_truth_odom(robot).name)]) for robot in robots}
-    return RunRecord(
+    record = RunRecord(
         leader_moved=_stamped(messages[f"/{names.LEADER}/{names.MOVED.name}"]),
         followers=tuple(_follower(robot, messages) for robot in robots if robot != names.LEADER),
         tracks={robot: track for robot, track in tracks.items() if track is not None},
         simulated_s=_last_stamp_ns(messages) / 1e9,
         details=bag.metadata(METADATA_NAME),
         ground=_ground(markers[-1]) if markers else None,
+        left_plate=tuple(message.data for message in messages[_absolute(names.left_plate().name)]),
     )
+    return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
 
 
 def _last_stamp_ns(messages: dict[str, list[Any]]) -> int:
@@ -79,10 +82,12 @@ def _robots(bag: Bag) -> list[str]:
 
 def _topics(robots: Sequence[str]) -> dict[str, str]:
     """Name the topics that the analysis reads, with their message types."""
-    topics = {_absolute(names.SURFACE.name): names.SURFACE.type}
+    topics = {_absolute(topic.name): topic.type for topic in (names.SURFACE, names.left_plate())}
     for robot in robots:
         odom = names.ground_truth_odom(robot)
         topics[_absolute(odom.name)] = odom.type
+        seen = names.overhead_path(robot)
+        topics[_absolute(seen.name)] = seen.type
         topics.update({f"/{robot}/{topic.name}": topic.type for topic in (*_MOTIONS, names.ALIGNMENT)})
     return topics
 
@@ -130,6 +135,39 @@ def _track(messages: Sequence[Any]) -> Track | None:
     yaws = np.array([_yaw(pose.orientation) for pose in poses])
     order = np.argsort(stamps, kind="stable")
     return Track(stamps[order], positions[order], yaws[order])
+
+
+def _overhead(robots: Sequence[str], messages: dict[str, list[Any]], dot_height_m: float) -> dict[str, OverheadTrack]:
+    """Compare the tracker's last path of each robot with the true places of its dot."""
+    tracks = {}
+    for robot in robots:
+        paths = messages[_absolute(names.overhead_path(robot).name)]
+        truth = messages[_absolute(names.ground_truth_odom(robot).name)]
+        if not paths or not truth:
+            continue
+        poses = max(paths, key=_stamp_ns).poses
+        stamps = np.array([_stamp_ns(pose) for pose in poses], dtype=np.int64)
+        seen = np.array([_place(pose.pose.position) for pose in poses])
+        true_stamps = np.array([_stamp_ns(message) for message in truth], dtype=np.int64)
+        order = np.argsort(true_stamps, kind="stable")
+        # A robot that stands says nothing, so its last word before the picture holds.
+        index = np.searchsorted(true_stamps[order], stamps, side="right") - 1
+        known = index >= 0
+        dots = np.array([_dot(truth[number].pose.pose, dot_height_m) for number in order[index[known]]])
+        tracks[robot] = OverheadTrack(stamps[known], seen[known].reshape(-1, 3), dots.reshape(-1, 3))
+    return tracks
+
+
+def _place(point: Any) -> tuple[float, float, float]:
+    return (float(point.x), float(point.y), float(point.z))
+
+
+def _dot(pose: Any, height_m: float) -> tuple[float, float, float]:
+    """Place of a robot's dot, which is on the z axis of its base_link."""
+    q = pose.orientation
+    x, y, z = _place(pose.position)
+    up_x, up_y = 2.0 * (q.x * q.z + q.y * q.w), 2.0 * (q.y * q.z - q.x * q.w)
+    return (x + height_m * up_x, y + height_m * up_y, z + height_m * (1.0 - 2.0 * (q.x * q.x + q.y * q.y)))
 
 
 def _ground(marker: Any) -> Ground | None:

@@ -9,6 +9,8 @@ formation error
     |e| with e = p_F - p_B - R(psi_B)(0, -d): actual minus desired place of base_link in world x, y when the follower
     reports (ground truth), d to the right of the beacon neighbour B (0.32 m by default). Over the timesteps: RMSE of
     |e|; bias, the mean of e in B's frame as u and v; scatter, the RMS distance from it. RMSE^2 = bias^2 + scatter^2.
+overhead error
+    distance in world x, y between a robot's reference dot as the overhead tracker saw it and the dot's true place.
 heading error
     psi_F - psi_B, between -pi and pi.
 
@@ -94,7 +96,7 @@ class FollowerAnalysis:
 
 @dataclass(frozen=True)
 class RunAnalysis:
-    """A run's scenario, outcome (done, lost or incomplete) and followers."""
+    """A run's scenario, outcome (done, lost, left_plate or incomplete) and followers."""
 
     scenario: str | None
     outcome: str
@@ -147,6 +149,7 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
             "movements": unfinished.movements,
         }
     values["path_length_m"] = {robot: track.length_m for robot, track in record.tracks.items()}
+    values["overhead_error_m"] = overhead_errors(record)
     values["simulated_seconds"] = record.simulated_s
     return FollowerAnalysis(follower.name, follower.lost, timesteps, unfinished, values)
 
@@ -170,6 +173,14 @@ def totals(timesteps: Sequence[Timestep]) -> dict[str, Any]:
         **_error_statistics(errors),
         "heading_error_rmse_rad": float(np.sqrt(np.mean(headings**2))) if headings.size else None,
     }
+
+
+def overhead_errors(record: RunRecord) -> dict[str, dict[str, float]] | None:
+    """Root mean square and largest overhead error of each robot over the whole run, metres; None without a tracker."""
+    errors = {robot: track.errors_m for robot, track in record.overhead.items() if len(track.stamps_ns)}
+    return {
+        robot: {"rms": float(np.sqrt(np.mean(found**2))), "max": float(found.max())} for robot, found in errors.items()
+    } or None
 
 
 def formation_error_uv_m(
@@ -242,6 +253,8 @@ def _error_statistics(errors_uv_m: NDArray[np.float64]) -> dict[str, float | Non
 def _outcome(record: RunRecord, followers: Sequence[FollowerAnalysis]) -> str:
     if any(follower.lost for follower in followers) or record.details.get("outcome") == "lost":
         return "lost"
+    if record.left_plate:
+        return "left_plate"
     planned = record.timesteps_planned
     if planned is None:
         return "incomplete" if any(follower.unfinished is not None for follower in followers) else "done"

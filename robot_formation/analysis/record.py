@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -12,6 +13,9 @@ from robot_formation.control.motion import Motion
 
 FORMATION_DISTANCE_M = 0.32
 """Distance between base_link origins in formation, along u (paper, with the axes read as side by side)."""
+
+DOT_HEIGHT_M = 0.216
+"""Height of the reference dot above base_link (paper: the robot's height)."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,26 @@ class Ground:
 
 
 @dataclass(frozen=True)
+class OverheadTrack:
+    """Where the overhead tracker saw a robot's reference dot, and where the dot truly was: world, metres.
+
+    Attributes:
+        stamps_ns: (n,) nanoseconds, in order.
+        seen_m: (n, 3) x, y, z as tracked.
+        true_m: (n, 3) x, y, z by ground truth.
+    """
+
+    stamps_ns: NDArray[np.int64]
+    seen_m: NDArray[np.float64]
+    true_m: NDArray[np.float64]
+
+    @property
+    def errors_m(self) -> NDArray[np.float64]:
+        """Distances (n,) between the two in world x, y, metres."""
+        return np.asarray(np.linalg.norm(self.seen_m[:, :2] - self.true_m[:, :2], axis=1))
+
+
+@dataclass(frozen=True)
 class RunRecord:
     """A run.
 
@@ -92,6 +116,8 @@ class RunRecord:
         simulated_s: simulated seconds from the first to the last record.
         details: what the run says of itself (scenario, seed, predictor, surface, timesteps, ...), as text.
         ground: the surface's mesh if it is known.
+        overhead: what the overhead tracker saw, by robot; empty without one.
+        left_plate: robots whose reference dot has left the plate.
     """
 
     leader_moved: tuple[Stamped, ...]
@@ -100,12 +126,22 @@ class RunRecord:
     simulated_s: float = 0.0
     details: Mapping[str, str] = field(default_factory=dict)
     ground: Ground | None = None
+    overhead: Mapping[str, OverheadTrack] = field(default_factory=dict)
+    left_plate: tuple[str, ...] = ()
 
     @property
     def timesteps_planned(self) -> int | None:
         """Timesteps that the scenario has, if the run says."""
         text = self.details.get("timesteps", "")
         return int(text) if text.isdigit() else None
+
+    @property
+    def dot_height_m(self) -> float:
+        """Height of the reference dot above base_link, metres: what the run says, else the paper's robot's."""
+        try:
+            return float(json.loads(self.details["parameters"])["world"]["marker.top_m"])
+        except (KeyError, ValueError, TypeError):
+            return DOT_HEIGHT_M
 
     @property
     def formation_distance_m(self) -> float:

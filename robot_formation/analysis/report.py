@@ -107,6 +107,7 @@ def _totals(follower: FollowerAnalysis) -> list[str]:
         ("formation error", _formation_error(values)),
         ("heading error", f"RMSE {_scaled(values['heading_error_rmse_rad'], math.degrees(1.0))} deg"),
         ("path", ", ".join(f"{robot} {length:.3f} m" for robot, length in values["path_length_m"].items()) or _NONE),
+        *_overhead_error(values),
         ("simulated time", f"{values['simulated_seconds']:.1f} s"),
     ]
     unfinished = values["unfinished_timestep"]
@@ -134,3 +135,12 @@ def _formation_error(values: dict[str, Any]) -> str:
     keys = ("rmse_m", "bias_u_m", "bias_v_m", "scatter_m")
     rmse, bias_u, bias_v, scatter = (_scaled(values[f"formation_error_{key}"], 100.0) for key in keys)
     return f"RMSE {rmse} cm (bias u {bias_u}, v {bias_v}; scatter {scatter})"
+
+
+def _overhead_error(values: dict[str, Any]) -> list[tuple[str, str]]:
+    errors = values["overhead_error_m"] or {}
+    texts = [
+        f"{robot} RMS {_scaled(error['rms'], 100.0)}, max {_scaled(error['max'], 100.0)} cm"
+        for robot, error in errors.items()
+    ]
+    return [("overhead camera", "; ".join(texts))] if texts else []

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.bag.qos import TopicQos
+from robot_formation.bag.transforms import Transforms
 from robot_formation.bag.writer import BagWriter
 
 _CHUNK_BYTES = 1 << 20
@@ -16,7 +17,10 @@ METADATA_NAME = "robot_formation"
 
 
 class Recorder:
-    """Writes messages into a bag. Their log time is simulated: their own stamp, or the latest one seen before them."""
+    """Writes messages into a bag. Their log time is simulated: their own stamp, or the latest one seen before them.
+
+    It adds /tf and /tf_static, made of true poses and robot descriptions, when it ends a chunk.
+    """
 
     def __init__(self, path: Path, metadata: Mapping[str, str]) -> None:
         """Open the bag.
@@ -28,6 +32,8 @@ class Recorder:
         if metadata:
             self._writer.write_metadata(METADATA_NAME, metadata)
         self._topics: set[str] = set()
+        self._own: set[str] = set()
+        self._transforms = Transforms()
         self._now_ns = 0
         self._pending_bytes = 0
 
@@ -54,6 +60,7 @@ class Recorder:
         else:
             self._now_ns = max(self._now_ns, stamp_ns)
         self._writer.write(topic, cdr, stamp_ns)
+        self._transforms.take(topic, type_name, cdr, stamp_ns)
         self._pending_bytes += len(cdr)
         if self._pending_bytes > _CHUNK_BYTES:
             self.end_chunk()
@@ -61,12 +68,27 @@ class Recorder:
     def end_chunk(self) -> None:
         """Make what was recorded so far survive the recorder's death."""
         if self._pending_bytes:
+            self._add_transforms()
             self._writer.end_chunk()
             self._pending_bytes = 0
 
     def close(self) -> Path:
         """Finish the bag; return its path."""
-        return self._writer.close()
+        try:
+            self._add_transforms()
+        finally:
+            path = self._writer.close()
+        return path
+
+    def _add_transforms(self) -> None:
+        for topic, cdr, stamp_ns in self._transforms.make():
+            if topic.name not in self._own:
+                if topic.name in self._topics:
+                    continue  # somebody publishes it
+                q = topic.qos
+                self.add_topic(topic.name, topic.type, TopicQos(q.history, q.depth, q.reliability, q.durability))
+                self._own.add(topic.name)
+            self._writer.write(topic.name, cdr, stamp_ns)
 
 
 @cache

@@ -11,15 +11,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import robot_formation
-from robot_formation.cli import analyze, detect, doctor, list_, run, teach, test
+from robot_formation.cli import analyze, calibrate, detect, doctor, list_, run, teach, test
 from robot_formation.errors import FormationError
 
-VERBS = (run, list_, analyze, teach, detect, doctor, test)
+VERBS = (run, list_, analyze, calibrate, teach, detect, doctor, test)
 BAD_INPUT_EXIT_CODE = 2
 INTERRUPTED_EXIT_CODE = 130
 
 EPILOG = """\
-exit codes: 0 done, 2 usage or bad input, 3 leader lost, 4 a node died, 130 interrupted
+exit codes: 0 done, 2 usage or bad input, 3 leader lost or plate left, 4 a node died, 130 interrupted
 """
 
 

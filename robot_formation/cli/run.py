@@ -52,7 +52,7 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run, analyse, print; return 0 done, 3 lost, 4 a node died, 130 interrupted.
+    """Run, analyse, print; return 0 done, 3 lost or off the plate, 4 a node died, 130 interrupted.
 
     Raises:
         FormationError: on anything wrong in the arguments, before anything is started.
@@ -125,10 +125,12 @@ def check_free(bag: Path) -> None:
 
 def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResult:
     """Run the scenario in the way that the options ask for."""
+    from robot_formation.experiment.drive_curves import describe_curves
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
+    say(describe_curves(scenario))
     if args.in_process:
         from robot_formation.experiment.in_process import run_in_process
         from robot_formation.launching.processes import run_metadata

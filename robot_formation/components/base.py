@@ -47,8 +47,11 @@ class Place:
 class Component:
     """Base of all components. The host calls `attach` once, then `start`, then the inputs' handlers in order.
 
-    A component that has finished sets `exit_code`; its host then ends with it.
+    A component that has finished sets `exit_code`; its host then ends with it. `settable` components take changed
+    parameters after the start.
     """
+
+    settable = False
 
     def __init__(self, place: Place) -> None:
         self.place = place
@@ -76,6 +79,17 @@ class Component:
     def services(self) -> dict[str, Callable[[], tuple[bool, str]]]:
         """List the std_srvs/Trigger services by relative name; each returns success and a message."""
         return {}
+
+    def switches(self) -> dict[str, Callable[[bool], tuple[bool, str]]]:
+        """List the std_srvs/SetBool services by relative name; each takes the value and answers like a Trigger."""
+        return {}
+
+    def set_parameters(self, parameters: Any) -> None:
+        """Take changed parameters, an object of the component's parameter class; asked for only if `settable`.
+
+        Raises:
+            FormationError: to refuse them.
+        """
 
     def start(self) -> None:
         """Begin: called once after everything is connected."""

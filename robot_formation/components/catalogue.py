@@ -48,6 +48,7 @@ KINDS: dict[str, NodeKind] = {
     kind.name: kind
     for kind in (
         _kind("world", "World", "WorldNodeParameters", ""),
+        _kind("overhead_tracker", "OverheadTracker", "OverheadTrackerNodeParameters", ""),
         _kind("drive", "Drive", "robot_formation.control.drive.DriveParameters", "all"),
         _kind("block_detector", "BlockDetector", "BlockDetectorNodeParameters", "followers"),
         _kind("predictor", "Predictor", "robot_formation.koopman.predictors.PredictorParameters", "followers"),

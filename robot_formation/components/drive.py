@@ -7,6 +7,7 @@ from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.control.calibration import calibrated
 from robot_formation.control.drive import Drive, DriveAction, DriveParameters
 
 # Encoder wheels: half a pulse of 0.233 mm and 0.3 % of 5 cm, rounded up, as one standard deviation each way.
@@ -18,7 +19,8 @@ class DriveComponent(Component):
 
     def __init__(self, parameters: DriveParameters, place: Place) -> None:
         super().__init__(place)
-        self._drive = Drive(parameters)
+        self._drive = Drive(calibrated(parameters, place.robot))
+        self._calibration = parameters.calibration_file or "by parameters"
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
@@ -34,7 +36,7 @@ class DriveComponent(Component):
 
     def details(self) -> dict[str, str]:
         """See `Component`."""
-        return {"moving": str(self._drive.busy)}
+        return {"moving": str(self._drive.busy), "calibration": self._calibration}
 
     def _on_move(self, message: Any) -> None:
         self.stamp_ns = max(self.stamp_ns, conversions.stamp_of(message))

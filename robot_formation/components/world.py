@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,13 @@ from numpy.typing import NDArray
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.components.overhead_view import OverheadView
+from robot_formation.errors import FormationError
 from robot_formation.parameters import ParameterError, parameter
-from robot_formation.surface import Surface, make_surface
-from robot_formation.world.events import Event, Frame, JointStates, RobotPose
+from robot_formation.surface import Surface, surface_from_texts
+from robot_formation.world.checks import check_setup
+from robot_formation.world.description import robot_description
+from robot_formation.world.events import Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.robot import RobotStart
 from robot_formation.world.world import World
@@ -36,6 +41,9 @@ class WorldNodeParameters(WorldParameters):
     real_time_factor: float = parameter(
         0.0, "Simulated seconds per wall second; 0 is as fast as possible", low=0.0, high=1000.0
     )
+    leaving_ends_run: bool = parameter(
+        True, "End with exit code 3 when a robot's reference dot leaves the plate; false: only hold the robot there"
+    )
 
     def __post_init__(self) -> None:
         """Check that every robot has a start."""
@@ -53,41 +61,42 @@ class WorldNodeParameters(WorldParameters):
 
     def make_surface(self) -> Surface:
         """Build the surface that the parameters name."""
-        return make_surface(self.surface, surface_values(self.surface_parameters))
+        return surface_from_texts(self.surface, self.surface_parameters)
 
+    def check(self) -> None:
+        """Check the surface and the starts on it, as far as that can be done without a world.
 
-def surface_values(texts: tuple[str, ...]) -> Mapping[str, float]:
-    """Read 'name=value' texts.
-
-    Raises:
-        ParameterError: if a text is no name and number.
-    """
-    values = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        try:
-            values[name] = float(value)
-        except ValueError:
-            raise ParameterError(
-                f"world: 'surface_parameters' must hold texts like 'height_m=0.1', not {text!r}"
-            ) from None
-    return values
+        Raises:
+            FormationError: on a surface that can't be made, or a robot that would start beyond the plate.
+        """
+        check_setup(self.make_surface(), self.starts(), self, self.seed)
 
 
 class WorldComponent(Component):
     """Moves robots on `<robot>/joint_commands`, takes pictures on `<robot>/camera/request`, publishes what happens."""
 
+    settable = True
+
     def __init__(self, parameters: WorldNodeParameters, place: Place) -> None:
         super().__init__(place)
-        self._surface = parameters.make_surface()
-        self._parameters = parameters
-        self._world = World(self._surface, parameters.starts(), parameters, seed=parameters.seed)
+        self._set_up(parameters, 0)
+        self._next = parameters
+        self._paused = False
         self._cameras = [start.name for start in parameters.starts() if start.camera]
-        self._paths: dict[str, list[Any]] = {name: [] for name in parameters.robots}
         # Topics are made once: a run sends thousands of messages.
         self._joint_states = {name: names.joint_states(name) for name in parameters.robots}
         self._images = {name: names.camera_image(name) for name in self._cameras}
         self._odom = {name: names.ground_truth_odom(name) for name in parameters.robots}
+
+    def _set_up(self, parameters: WorldNodeParameters, start_ns: int) -> None:
+        """Make the world, or leave everything as it was if that is refused."""
+        surface = parameters.make_surface()
+        self._world = World(surface, parameters.starts(), parameters, seed=parameters.seed, start_ns=start_ns)
+        self._surface = surface
+        self._parameters = parameters
+        self._paths: dict[str, list[Any]] = {name: [] for name in parameters.robots}
+        self._overhead = OverheadView(surface, parameters, parameters.seed)
+        self.stamp_ns = start_ns
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
@@ -99,13 +108,14 @@ class WorldComponent(Component):
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
-        topics = [names.CLOCK_TOPIC, names.SURFACE]
+        topics = [names.CLOCK_TOPIC, names.SURFACE, names.left_plate(), *self._overhead.topics()]
         for name in self._parameters.robots:
             topics += [
                 self._joint_states[name],
                 self._odom[name],
                 names.ground_truth_pose(name),
                 names.ground_truth_path(name),
+                names.robot_description(name),
             ]
         for name in self._cameras:
             topics += [self._images[name], names.camera_info(name)]
@@ -113,6 +123,7 @@ class WorldComponent(Component):
 
     def start(self) -> None:
         """See `Component`: publishes what stands still, and every robot's start."""
+        now = self.stamp_ns
         vertices, colours, triangles = surface_mesh(self._surface)
         self._send(names.SURFACE, conversions.surface_marker(vertices, colours, triangles, names.WORLD_FRAME))
         camera = self._parameters.camera
@@ -123,29 +134,84 @@ class WorldComponent(Component):
                 camera.focal_length_px,
                 (camera.centre_x_px, camera.centre_y_px),
                 f"{name}/{names.OPTICAL_FRAME}",
-                0,
+                now,
             )
             self._send(names.camera_info(name), info)
-        self._send(names.CLOCK_TOPIC, conversions.clock(0))
         for name in self._parameters.robots:
-            self._publish(RobotPose(name, 0, self._world.ground_truth(name), final=True))
+            text = robot_description(name, self._parameters, camera=name in self._cameras)
+            self._send(names.robot_description(name), conversions.string(text))
+        self._overhead.announce(self._send, now)
+        self._send(names.CLOCK_TOPIC, conversions.clock(now))
+        for name in self._parameters.robots:
+            self._publish(RobotPose(name, now, self._world.ground_truth(name), final=True))
+        self._overhead.look(self._world, self._send)
 
     @property
     def busy(self) -> bool:
         """See `Component`."""
-        return self._world.owes
+        return self._world.owes and not self._paused
 
     def work(self) -> None:
         """See `Component`: advances to the next instant that has something to publish."""
-        events = self._world.advance()
+        self._tell(self._world.advance())
+
+    def _tell(self, events: list[Event]) -> None:
         self.stamp_ns = self._world.stamp_ns
         self._send(names.CLOCK_TOPIC, conversions.clock(self.stamp_ns))
         for event in events:
             self._publish(event)
+        self._overhead.after(events, self._world, self._send)
 
     def details(self) -> dict[str, str]:
         """See `Component`."""
-        return {"simulated time [s]": f"{self._world.stamp_ns / 1e9:.3f}", "owes": str(self._world.owes)}
+        return {
+            "simulated time [s]": f"{self._world.stamp_ns / 1e9:.3f}",
+            "owes": str(self._world.owes),
+            "paused": str(self._paused),
+        }
+
+    def services(self) -> dict[str, Callable[[], tuple[bool, str]]]:
+        """See `Component`."""
+        return {"world/reset": self._on_reset, "world/step": self._on_step}
+
+    def switches(self) -> dict[str, Callable[[bool], tuple[bool, str]]]:
+        """See `Component`."""
+        return {"world/pause": self._on_pause}
+
+    def set_parameters(self, parameters: WorldNodeParameters) -> None:
+        """See `Component`: keeps them for the next reset."""
+        fixed = ("robots", "overhead.enabled")
+        for name in fixed:
+            if attrgetter(name)(parameters) != attrgetter(name)(self._parameters):
+                raise ParameterError(f"world: '{name}' decides on topics and can't change; start another world")
+        parameters.check()
+        self._next = parameters
+
+    def _on_reset(self) -> tuple[bool, str]:
+        """Start again with the parameters set before; stamps go on at the next whole second."""
+        old = self._world
+        try:
+            self._set_up(self._next, (old.stamp_ns // 10**9 + 1) * 10**9)
+        except FormationError as error:
+            return False, f"{error}; nothing was reset"
+        old.close()
+        self.start()
+        for name in self._parameters.robots:
+            self._publish(self._world.joint_states(name))
+        return True, f"seed {self._parameters.seed}, from {self.stamp_ns / 1e9:g} s on"
+
+    def _on_pause(self, paused: bool) -> tuple[bool, str]:
+        self._paused = paused
+        return True, "paused" if paused else "running"
+
+    def _on_step(self) -> tuple[bool, str]:
+        """Make one physics step."""
+        if not self._paused:
+            return False, "the world runs: call world/pause with true first"
+        if not self._world.owes:
+            return False, "nothing is owed: time stands still until a command or a request comes"
+        self._tell(self._world.step())
+        return True, f"{self.stamp_ns / 1e9:.6f} s"
 
     def _on_command(self, robot: str, message: Any) -> None:
         try:
@@ -172,6 +238,12 @@ class WorldComponent(Component):
                 self._send(self._images[event.robot], conversions.image(event.image, frame, event.stamp_ns))
             case RobotPose():
                 self._publish_truth(event)
+            case LeftPlate():
+                self._send(names.left_plate(), conversions.string(event.robot))
+                text = f"{event.robot} has left the plate at ({event.x_m:.2f}, {event.y_m:.2f}) m and is held there"
+                self.warn(text)
+                if self._parameters.leaving_ends_run:
+                    self.finish(3, text)
 
     def _publish_truth(self, event: RobotPose) -> None:
         robot, state = event.robot, event.state

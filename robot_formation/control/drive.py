@@ -20,8 +20,8 @@ WHEELS = ("front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_righ
 ENCODER_WHEELS = ("encoder_wheel_v", "encoder_wheel_u")
 JOINTS = WHEELS + ENCODER_WHEELS
 
-# Rotation of front left, front right, rear left, rear right per unit of the leg: mecanum kinematics, rollers in X.
-_SIGNS = {"yaw": (-1.0, 1.0, -1.0, 1.0), "x": (1.0, 1.0, 1.0, 1.0), "y": (-1.0, 1.0, 1.0, -1.0)}
+LEG_SIGNS = {"yaw": (-1.0, 1.0, -1.0, 1.0), "x": (1.0, 1.0, 1.0, 1.0), "y": (-1.0, 1.0, 1.0, -1.0)}
+"""Rotation of front left, front right, rear left, rear right per unit of a leg: mecanum kinematics, rollers in X."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,9 @@ class DriveParameters:
     """Calibration, range and sensing of one robot's drive."""
 
     calibration: CalibrationParameters = CalibrationParameters()
+    calibration_file: str = parameter(
+        "", "YAML file of 'formation calibrate motors': this robot's curves in it go before 'calibration'; empty: none"
+    )
     max_v_m: float = parameter(0.2, "Calibrated range along v; longer moves are refused", unit="m", low=0.0, high=10.0)
     max_u_m: float = parameter(0.1, "Calibrated range along u; longer moves are refused", unit="m", low=0.0, high=10.0)
     max_turn_rad: float = parameter(1.1, "Calibrated range of turns", unit="rad", low=0.0, high=6.3)
@@ -168,7 +171,7 @@ class Drive:
         ):
             angle = sum(c * abs(amount) ** power for power, c in enumerate(curve)) if amount else 0.0
             if angle > 0.0:  # a leg shorter than the robot's coasting can't be driven
-                angles = tuple(math.copysign(angle, amount) * sign for sign in _SIGNS[axis])
+                angles = tuple(math.copysign(angle, amount) * sign for sign in LEG_SIGNS[axis])
                 legs.append(WheelCommand(angles, (self._parameters.wheel_speed_rad_s,) * 4))
         return legs
 

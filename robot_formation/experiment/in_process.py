@@ -18,7 +18,7 @@ from robot_formation import conversions
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.recorder import Recorder
 from robot_formation.components.base import Component, Handler, Place
-from robot_formation.components.catalogue import KINDS, NodeKind
+from robot_formation.components.catalogue import NodeKind
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
@@ -54,18 +54,14 @@ class InProcessRun:
     def __post_init__(self) -> None:
         self._queue: deque[tuple[str, Topic, Any]] = deque()
         self._handlers: dict[str, list[Handler]] = {}
-        self._hosted = [
-            self._host(kind, robot)
-            for kind in KINDS.values()
-            for robot in kind.robots_of(self.scenario.setup.followers)
-        ]
+        self._hosted = [self._host(kind, robot) for kind, robot in self.scenario.hosts()]
         for hosted in self._hosted:
             for entry in hosted.component.inputs():
                 name = absolute(hosted.namespace, entry.topic.name)
                 self._handlers.setdefault(name, []).append(entry.handler)
 
     def run(self) -> tuple[int, str]:
-        """Run until a component ends; return its exit code (0 done, 3 lost) and its reason unless it was done.
+        """Run until a component ends; return its exit code (0 done, 3 lost or off the plate) and its reason unless it was done.
 
         Raises:
             RunError: if everybody waits for somebody, which no run should come to.

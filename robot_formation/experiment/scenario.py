@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from robot_formation import names
-from robot_formation.components.catalogue import KINDS
+from robot_formation.components.catalogue import KINDS, NodeKind
 from robot_formation.errors import FormationError
+from robot_formation.experiment.drive_curves import check_curves
 from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
 from robot_formation.paths import config_dir
-from robot_formation.surface import SURFACES, make_surface
+from robot_formation.surface import SURFACES
 
 FORMATION_DISTANCE_M = 0.32
 
@@ -57,10 +59,21 @@ class Scenario:
         values = {**node_defaults(kind), **self.sections.get(kind, {})}
         if kind == "world":
             values.update(self._world())
+        elif kind == "overhead_tracker":
+            world = self.parameters("world")
+            known = ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters")
+            values = {**values, **{name: world[name] for name in known}, **self.sections.get(kind, {})}
         elif kind == "leader":
             values["followers"] = self.robots[1:]
         checked = from_mapping(KINDS[kind].parameter_class(), values, where=kind)
         return to_mapping(checked)
+
+    def hosts(self) -> Iterator[tuple[NodeKind, str]]:
+        """Yield every node to start, in order, with its robot ('' for the run's own)."""
+        overhead = self.parameters("world")["overhead.enabled"]
+        for kind in KINDS.values():
+            if kind.name != "overhead_tracker" or overhead:
+                yield from ((kind, robot) for robot in kind.robots_of(self.setup.followers))
 
     def robot_parameters(self, kind: str, robot: str) -> dict[str, Any]:
         """Collect the parameters of one robot's node."""
@@ -71,17 +84,15 @@ class Scenario:
         return values
 
     def check(self) -> None:
-        """Check every node's parameters and the surface's.
+        """Check every node's parameters, the surface's and the drives' calibration.
 
         Raises:
             FormationError: naming what is wrong.
         """
         for kind in KINDS:
             self.parameters(kind)
-        from robot_formation.components.world import surface_values
-
-        world = self.parameters("world")
-        make_surface(world["surface"], surface_values(tuple(world["surface_parameters"])))
+        from_mapping(KINDS["world"].parameter_class(), self.parameters("world"), where="world").check()
+        check_curves(self)
 
     def _world(self) -> dict[str, Any]:
         heading = math.radians(self.setup.heading_deg)
@@ -199,10 +210,16 @@ def node_defaults(kind: str) -> dict[str, Any]:
         ScenarioError: if the file has not the form of a ROS parameter file.
     """
     path = config_dir() / f"{kind}.yaml"
+    # A run asks for them many times, and PyYAML takes milliseconds each.
+    changed_ns = path.stat().st_mtime_ns if path.exists() else 0
+    return dict(_node_defaults(path, changed_ns))
+
+
+@lru_cache(maxsize=64)
+def _node_defaults(path: Path, changed_ns: int) -> dict[str, Any]:
     content = read_yaml(path)
     try:
-        values = content["/**"]["ros__parameters"]
-        return flatten(values)
+        return flatten(content["/**"]["ros__parameters"])
     except (KeyError, TypeError, AttributeError):
         raise ScenarioError(f"{path}: a ROS parameter file begins with '/**:' and 'ros__parameters:'") from None
 

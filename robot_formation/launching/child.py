@@ -17,7 +17,7 @@ from robot_formation.experiment.run_result import NodeUsage
 from robot_formation.launching.processes import Process
 
 _PR_SET_PDEATHSIG = 1
-_LOG_LINE = re.compile(r"\[(?:WARN|ERROR|FATAL)\] \[[\d.]+\] \[(?P<node>[^\]]+)\]: (?P<text>.*)")
+_LOG_LINE = re.compile(r"\[(?P<level>INFO|WARN|ERROR|FATAL)\] \[[\d.]+\] \[(?P<node>[^\]]+)\]: (?P<text>.*)")
 
 
 def _die_with_parent() -> None:
@@ -87,7 +87,7 @@ class Child:
     def warnings(self) -> list[str]:
         """List what it warned of."""
         matches = (_LOG_LINE.match(line) for line in self._text().splitlines())
-        return [f"{self.name}: {match['text']}" for match in matches if match]
+        return [f"{self.name}: {match['text']}" for match in matches if match and match["level"] != "INFO"]
 
     def _text(self) -> str:
         return self._log.read_text(encoding="utf-8", errors="replace")

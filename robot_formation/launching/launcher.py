@@ -136,7 +136,7 @@ class Launcher:
         code, executable = ended.exit_code, ended.process.executable
         if code == 0 and executable == "leader":
             return DONE_EXIT_CODE, ""
-        if code == LOST_EXIT_CODE and executable == "fine_tuner":
+        if code == LOST_EXIT_CODE and executable in ("fine_tuner", "world"):
             return LOST_EXIT_CODE, ended.last_words()
         if code == _BAD_INPUT_EXIT_CODE:
             raise RunError(ended.last_words())

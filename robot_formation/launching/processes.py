@@ -12,6 +12,7 @@ from typing import Any
 
 import robot_formation
 from robot_formation.components.catalogue import KINDS
+from robot_formation.experiment.drive_curves import robot_curves
 from robot_formation.experiment.scenario import Scenario
 
 RECORDER = "recorder"
@@ -57,9 +58,8 @@ def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, pat
             "metadata": [f"{k}={v}" for k, v in run_metadata(scenario).items()],
         }
         found.append(Process(RECORDER, "/", parameters))
-    for kind in KINDS.values():
-        for robot in kind.robots_of(scenario.setup.followers):
-            found.append(Process(kind.name, f"/{robot}", {**scenario.robot_parameters(kind.name, robot), **host}))
+    for kind, robot in scenario.hosts():
+        found.append(Process(kind.name, f"/{robot}", {**scenario.robot_parameters(kind.name, robot), **host}))
     return found
 
 
@@ -75,6 +75,7 @@ def run_metadata(scenario: Scenario) -> dict[str, str]:
         "timesteps": str(leader["timesteps"]),
         "camera": world["camera.mode"],
         "parameters": json.dumps({kind: scenario.parameters(kind) for kind in KINDS}, sort_keys=True),
+        "drive_curves": json.dumps(robot_curves(scenario)),
         "versions": json.dumps(_versions()),
     }
 

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import rclpy
@@ -19,7 +20,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Place
@@ -27,7 +28,7 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.outbox import IMAGE_TYPE, Outbox
-from robot_formation.nodes.parameters import HostParameters, declare
+from robot_formation.nodes.parameters import HostParameters, declare, take_changes
 
 _IDLE_S = 0.1  # how often an idle node looks for signals
 _HELD_BACK_S = 0.01  # how often it looks for listeners while messages are held back
@@ -101,15 +102,19 @@ class Host:
     def __init__(self, node: Node, kind: str) -> None:
         self._node = node
         entry = KINDS[kind]
-        parameters, self._parameters = declare(node, entry.parameter_class(), HostParameters)
+        own, component_class = entry.parameter_class(), entry.component_class()
+        settable = (own,) if component_class.settable else ()
+        parameters, self._parameters = declare(node, own, HostParameters, settable=settable)
         robot = node.get_namespace().strip("/").rpartition("/")[2]
         if entry.robots and not robot:
             raise FormationError(
                 f"{kind} belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1"
             )
         place = Place(robot if entry.robots else "", self._parameters.formation)
-        self._real_time_factor = getattr(parameters, "real_time_factor", 0.0)
-        self._component: Component = entry.component_class()(parameters, place)
+        self._pacer = Pacer(getattr(parameters, "real_time_factor", 0.0))
+        self._component: Component = component_class(parameters, place)
+        if settable:
+            take_changes(node, parameters, self._set_parameters)
         self._outbox = Outbox(
             node,
             patience_s=self._parameters.wait_for_listeners_s,
@@ -134,7 +139,9 @@ class Host:
             qos = qos_profile(replace(topic.qos, durability="volatile"))
             node.create_subscription(conversions.message_class(topic.type), topic.name, handler, qos)
         for name, service in self._component.services().items():
-            node.create_service(Trigger, name, self._trigger(service))
+            node.create_service(Trigger, name, partial(_trigger, service))
+        for name, switch in self._component.switches().items():
+            node.create_service(SetBool, name, partial(_switch, switch))
         health = names.DIAGNOSTICS
         self._health = node.create_publisher(
             conversions.message_class(health.type), health.name, qos_profile(health.qos)
@@ -147,7 +154,6 @@ class Host:
         executor.add_node(self._node)
         component, outbox = self._component, self._outbox
         component.start()
-        pacer = Pacer(self._real_time_factor)
         try:
             while not stopped() and (component.exit_code is None or outbox.waiting):
                 outbox.flush()
@@ -156,7 +162,7 @@ class Host:
                     executor.spin_once(0.0 if busy else _HELD_BACK_S if outbox.waiting else _IDLE_S)
                 if component.busy and not outbox.waiting and component.exit_code is None:
                     component.work()
-                    pacer.wait(component.stamp_ns)
+                    self._pacer.wait(component.stamp_ns)
             if component.exit_code is not None:
                 self._say(0, component.exit_reason)
             self._publish_health()
@@ -178,16 +184,19 @@ class Host:
 
         return slow
 
-    def _trigger(self, service: Callable[[], tuple[bool, str]]) -> Callable[[Any, Any], Any]:
-        def answer(request: Any, response: Any) -> Any:
-            response.success, response.message = service()
-            return response
-
-        return answer
+    def _set_parameters(self, parameters: Any) -> None:
+        self._component.set_parameters(parameters)
+        self._pacer.factor = getattr(parameters, "real_time_factor", 0.0)
 
     def _say(self, level: int, text: str) -> None:
         logger = self._node.get_logger()
-        (logger.info, logger.warning, logger.error)[level](text)
+        # One line each: rclpy refuses different severities from the same line.
+        if level == 0:
+            logger.info(text)
+        elif level == 1:
+            logger.warning(text)
+        else:
+            logger.error(text)
 
     def _publish_health(self) -> None:
         for topic, publisher in self._publishers.items():
@@ -199,20 +208,30 @@ class Host:
         self._health.publish(conversions.diagnostics(name, health.level, health.text, health.values, stamp_ns))
 
 
+def _trigger(service: Callable[[], tuple[bool, str]], request: Any, response: Any) -> Any:
+    response.success, response.message = service()
+    return response
+
+
+def _switch(switch: Callable[[bool], tuple[bool, str]], request: Any, response: Any) -> Any:
+    response.success, response.message = switch(request.data)
+    return response
+
+
 class Pacer:
-    """Holds simulated time to a multiple of wall time; a factor of 0 never waits."""
+    """Holds simulated time to a multiple (`factor`) of wall time; a factor of 0 never waits."""
 
     def __init__(self, factor: float) -> None:
-        self._factor = factor
+        self.factor = factor
         self._wall_s: float | None = None
         self._simulated_ns = 0
 
     def wait(self, stamp_ns: int) -> None:
         """Sleep until the wall clock has caught up. Standing still doesn't build up credit to be made good later."""
-        if self._factor <= 0.0:
+        if self.factor <= 0.0:
             return
         now = time.monotonic()
-        step_s = (stamp_ns - self._simulated_ns) * 1e-9 / self._factor
+        step_s = (stamp_ns - self._simulated_ns) * 1e-9 / self.factor
         self._simulated_ns = stamp_ns
         due = max(now, (self._wall_s or now) + step_s)
         self._wall_s = due

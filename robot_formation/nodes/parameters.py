@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from robot_formation.errors import FormationError
 from robot_formation.names import FORMATION
-from robot_formation.parameters import ParameterError, Spec, from_mapping, parameter, specs, suggestion
+from robot_formation.parameters import ParameterError, Spec, from_mapping, parameter, specs, suggestion, to_mapping
 
 T = TypeVar("T")
 
@@ -47,8 +49,10 @@ class HostParameters:
     )
 
 
-def declare(node: Node, *classes: type) -> list[Any]:
+def declare(node: Node, *classes: type, settable: tuple[type, ...] = ()) -> list[Any]:
     """Declare the classes' parameters on the node and return them, filled and checked, one object per class.
+
+    Those of the classes in `settable` can be changed later, the others are read-only.
 
     Raises:
         ParameterError: on an unknown name, a wrong type or a value out of range.
@@ -65,13 +69,40 @@ def declare(node: Node, *classes: type) -> list[Any]:
     objects: list[Any] = []
     for cls in classes:
         objects.append(from_mapping(cls, {n: v for n, v in values.items() if n in specs(cls)}, where=where))
+    writable = {name for cls in settable for name in specs(cls)}
     for name, spec in known.items():
         default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
         override = values.get(name, default)
         node.declare_parameter(
-            name, Parameter(name, _TYPES[spec.type], override).value, _descriptor(spec), ignore_override=True
+            name,
+            Parameter(name, _TYPES[spec.type], override).value,
+            _descriptor(spec, name not in writable),
+            ignore_override=True,
         )
     return objects
+
+
+def take_changes(node: Node, current: Any, take: Callable[[Any], None]) -> None:
+    """Hand changed parameters to `take` as one checked object; what it or the check refuses is not set.
+
+    Args:
+        node: where the parameters were declared as settable.
+        current: the object that `declare` gave.
+        take: may raise FormationError to refuse.
+    """
+    cls, where = type(current), node.get_fully_qualified_name()
+    known, values = specs(cls), to_mapping(current)
+
+    def on_change(changed: list[Parameter]) -> SetParametersResult:
+        new = {item.name: _plain(known[item.name], item.value) for item in changed if item.name in known}
+        try:
+            take(from_mapping(cls, {**values, **new}, where=where))
+        except FormationError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        values.update(new)
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(on_change)
 
 
 def _plain(spec: Spec, value: Any) -> Any:
@@ -83,9 +114,9 @@ def _plain(spec: Spec, value: Any) -> Any:
     return list(value) if isinstance(value, (list, tuple)) else value
 
 
-def _descriptor(spec: Spec) -> ParameterDescriptor:
+def _descriptor(spec: Spec, read_only: bool) -> ParameterDescriptor:
     unit = f" [{spec.unit}]" if spec.unit else ""
-    descriptor = ParameterDescriptor(description=spec.description + unit, read_only=True)
+    descriptor = ParameterDescriptor(description=spec.description + unit, read_only=read_only)
     if spec.choices:
         descriptor.additional_constraints = "one of: " + ", ".join(map(str, spec.choices))
     low, high = spec.low, spec.high

@@ -6,24 +6,45 @@ A new surface is a frozen dataclass in a file of its own whose fields are made w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-from robot_formation.parameters import ParameterError, from_mapping, suggestion
+from robot_formation.parameters import ParameterError, from_mapping, specs, suggestion
 from robot_formation.surface.base import PLATE_SIZE_M, GradientNormal, Surface
 from robot_formation.surface.bowl import Bowl
+from robot_formation.surface.elliptic_bowl import EllipticBowl
+from robot_formation.surface.gaussian_bump import GaussianBump
+from robot_formation.surface.heightmap import Heightmap
+from robot_formation.surface.inclined_plane import InclinedPlane
 from robot_formation.surface.plane import Plane
+from robot_formation.surface.ripple import Ripple
+from robot_formation.surface.saddle import Saddle
 
-__all__ = ["PLATE_SIZE_M", "SURFACES", "Bowl", "GradientNormal", "Plane", "Surface", "make_surface"]
+__all__ = [
+    "PLATE_SIZE_M",
+    "SURFACES",
+    "Bowl",
+    "EllipticBowl",
+    "GaussianBump",
+    "GradientNormal",
+    "Heightmap",
+    "InclinedPlane",
+    "Plane",
+    "Ripple",
+    "Saddle",
+    "Surface",
+    "make_surface",
+    "surface_from_texts",
+]
 
-_KINDS: tuple[type[Any], ...] = (Bowl, Plane)
+_KINDS: tuple[type[Any], ...] = (Bowl, Plane, InclinedPlane, EllipticBowl, Saddle, GaussianBump, Ripple, Heightmap)
 
 SURFACES: Mapping[str, type[Any]] = MappingProxyType({kind.name: kind for kind in _KINDS})
 """Surface classes by name."""
 
 
-def make_surface(name: str, parameters: Mapping[str, float] = MappingProxyType({})) -> Surface:
+def make_surface(name: str, parameters: Mapping[str, Any] = MappingProxyType({})) -> Surface:
     """Build a surface.
 
     Args:
@@ -33,8 +54,34 @@ def make_surface(name: str, parameters: Mapping[str, float] = MappingProxyType({
     Raises:
         ParameterError: on an unknown name or parameter, with the nearest known one, or a value out of range.
     """
+    surface: Surface = from_mapping(_kind(name), parameters, where=f"surface '{name}'")
+    return surface
+
+
+def surface_from_texts(name: str, texts: Sequence[str]) -> Surface:
+    """Build a surface from texts like 'height_m=0.1' or 'file=hills.png', the form that a ROS parameter can hold.
+
+    Raises:
+        ParameterError: as `make_surface`, and on a text that is no name and value of the parameter's type.
+    """
+    known = specs(_kind(name))
+    values: dict[str, Any] = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not equals:
+            raise ParameterError(f"surface '{name}': its parameters are texts like 'size_m=2.0', not {text!r}")
+        if key in known and known[key].type is str:
+            values[key] = value
+            continue
+        try:
+            values[key] = float(value)
+        except ValueError:
+            raise ParameterError(f"surface '{name}': '{key}' needs a number, not {value!r}") from None
+    return make_surface(name, values)
+
+
+def _kind(name: str) -> type[Any]:
     kind = SURFACES.get(name)
     if kind is None:
         raise ParameterError(f"no surface '{name}'{suggestion(name, SURFACES)}")
-    surface: Surface = from_mapping(kind, parameters, where=f"surface '{name}'")
-    return surface
+    return kind

@@ -1,12 +1,14 @@
 """Simulated robots and cameras on a surface: bodies, traction, motors, encoders, pictures, and the rule of time."""
 
 from robot_formation.world.camera import Camera, Picture, Sensor
-from robot_formation.world.events import JOINT_NAMES, BodyState, Event, Frame, JointStates, RobotPose
+from robot_formation.world.checks import WorldError
+from robot_formation.world.events import JOINT_NAMES, BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose, pose_on_surface
 from robot_formation.world.robot import RobotStart
+from robot_formation.world.state import WorldState
 from robot_formation.world.teaching import marker_picture
-from robot_formation.world.world import World, WorldError
+from robot_formation.world.world import World
 
 __all__ = [
     "JOINT_NAMES",
@@ -15,6 +17,7 @@ __all__ = [
     "Event",
     "Frame",
     "JointStates",
+    "LeftPlate",
     "Picture",
     "Pose",
     "RobotPose",
@@ -23,6 +26,7 @@ __all__ = [
     "World",
     "WorldError",
     "WorldParameters",
+    "WorldState",
     "marker_picture",
     "pose_on_surface",
 ]

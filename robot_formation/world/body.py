@@ -17,6 +17,13 @@ HALF_ROOT = math.sqrt(0.5)
 ROLLER_DRAG_SPEED = 0.005
 """Slip speed (m/s) at which the roller drag has half its strength."""
 
+# Called for every robot in every step; PyBullet reads positional arguments faster than named ones.
+_read_pose = pybullet.getBasePositionAndOrientation
+_read_velocity = pybullet.getBaseVelocity
+_apply_force = pybullet.applyExternalForce
+_apply_torque = pybullet.applyExternalTorque
+_WORLD_FRAME = pybullet.WORLD_FRAME
+
 
 class Body:
     """Rigid Bullet body without ground contact of its own; the traction law gives the ground's forces.
@@ -28,6 +35,8 @@ class Body:
         wheels: front left, front right, rear left, rear right.
         encoder_angles: true angles of the encoder wheels v and u since the start, rad.
         encoder_speeds: their speeds, rad/s.
+        twist: mean depth of front left and rear right wheels less that of the others, halved, metres; the frame gives
+            way by it, so that all four wheels carry on ground that isn't flat under them.
     """
 
     def __init__(self, surface: Surface, parameters: WorldParameters, flaws: Imperfections, client: int) -> None:
@@ -37,6 +46,20 @@ class Body:
         self._dt = 1.0 / parameters.physics_hz
         self._mass_offset = (flaws.mass_x_m, flaws.mass_y_m, parameters.chassis.mass_height_m)
         self._weight = parameters.chassis.mass_kg * parameters.gravity_m_s2
+        traction = parameters.traction
+        self._law = (
+            traction.normal_stiffness_n_m,
+            traction.normal_damping_n_s_m,
+            traction.friction,
+            traction.roller_drag,
+            traction.bristle_stiffness_n_m,
+            traction.bristle_damping_n_s_m,
+            traction.relaxation_m,
+            parameters.wheels.radius_m,
+            max(0.0, traction.normal_stiffness_n_m - parameters.chassis.twist_stiffness_n_m),
+            parameters.chassis.twist_travel_m,
+        )
+        self.twist = 0.0
         self.wheels = self._make_wheels(flaws.rolling_radius_scale, flaws.motor_gain)
         encoder = parameters.encoder_wheels
         v_radius, u_radius = (0.5 * encoder.diameter_m * scale for scale in flaws.encoder_radius_scale)
@@ -57,7 +80,12 @@ class Body:
         places = ((1, 1, -1.0), (1, -1, 1.0), (-1, 1, 1.0), (-1, -1, -1.0))
         return tuple(
             Wheel(
-                p.motor, (i * half_base - cx, j * half_track - cy, height - cz), side, p.wheels.radius_m * scale, gain
+                p.motor,
+                (i * half_base - cx, j * half_track - cy, height - cz),
+                side,
+                p.wheels.radius_m * scale,
+                gain,
+                self._dt,
             )
             for (i, j, side), scale, gain in zip(places, radius_scales, gains, strict=True)
         )
@@ -105,7 +133,7 @@ class Body:
 
     def speed_squares(self) -> tuple[float, float]:
         """Squares of the centre of mass's speed (m/s) and of the turning rate (rad/s)."""
-        (vx, vy, vz), (wx, wy, wz) = pybullet.getBaseVelocity(self.index, physicsClientId=self._client)
+        (vx, vy, vz), (wx, wy, wz) = _read_velocity(self.index, self._client)
         return vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz
 
     def pose(self) -> Pose:
@@ -128,16 +156,13 @@ class Body:
         One long function on purpose: it is the simulation's hot loop, in plain scalars and local names.
         """
         client, body, dt = self._client, self.index, self._dt
-        traction = self.parameters.traction
-        stiffness, damping = traction.normal_stiffness_n_m, traction.normal_damping_n_s_m
-        grip, drag = traction.friction, traction.roller_drag
-        sigma0, sigma1 = traction.bristle_stiffness_n_m, traction.bristle_damping_n_s_m
-        relaxation = traction.relaxation_m
-        contact_radius = self.parameters.wheels.radius_m
+        stiffness, damping, grip, drag, sigma0, sigma1, relaxation, contact_radius, soft, travel = self._law
+        # The last step's twist: it changes with the distance driven only.
+        yielding, twist = soft * max(-travel, min(travel, self.twist)), 0.0
         gradient, height = self._surface.gradient, self._surface.height
         sqrt = math.sqrt
-        (px, py, pz), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
-        (vx, vy, vz), (wx, wy, wz) = pybullet.getBaseVelocity(body, physicsClientId=client)
+        (px, py, pz), (qx, qy, qz, qw) = _read_pose(body, client)
+        (vx, vy, vz), (wx, wy, wz) = _read_velocity(body, client)
         # Columns of the rotation matrix: forward (f), left (l), up (u).
         f_x, f_y, f_z = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy + qw * qz), 2 * (qx * qz - qw * qy)
         l_x, l_y, l_z = 2 * (qx * qy - qw * qz), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz + qw * qx)
@@ -161,9 +186,13 @@ class Body:
             s_x = vx + wy * arm_z - wz * arm_y
             s_y = vy + wz * arm_x - wx * arm_z
             s_z = vz + wx * arm_y - wy * arm_x
-            load = stiffness * (height(at_x, at_y) - at_z) * n_z - damping * (s_x * n_x + s_y * n_y + s_z * n_z)
+            depth, side = (height(at_x, at_y) - at_z) * n_z, wheel.side
+            twist -= side * depth
+            load = stiffness * depth + side * yielding - damping * (s_x * n_x + s_y * n_y + s_z * n_z)
             if load <= 1e-9:
                 wheel.bristle = 0.0
+                if wheel.state == DRIVING:
+                    wheel.control(dt)
                 wheel.turn(0.0, dt)
                 continue
             # Forward and left in the tangent plane, and the contact's velocity along them.
@@ -172,7 +201,7 @@ class Body:
             a_x, a_y, a_z = (f_x - lean * n_x) * scale, (f_y - lean * n_y) * scale, (f_z - lean * n_z) * scale
             b_x, b_y, b_z = n_y * a_z - n_z * a_y, n_z * a_x - n_x * a_z, n_x * a_y - n_y * a_x
             ahead = s_x * a_x + s_y * a_y + s_z * a_z
-            aside = (s_x * b_x + s_y * b_y + s_z * b_z) * wheel.side
+            aside = (s_x * b_x + s_y * b_y + s_z * b_z) * side
             # Sliding of the ground past the rim: held along the roller's axis, rolling off across it.
             past = ahead - wheel.rolling_radius * wheel.speed
             slip = (past + aside) * HALF_ROOT
@@ -189,7 +218,7 @@ class Body:
                 hold = -limit
             roll = -drag * load * free / (abs(free) + ROLLER_DRAG_SPEED)
             push_a = (hold + roll) * HALF_ROOT
-            push_b = (hold - roll) * HALF_ROOT * wheel.side
+            push_b = (hold - roll) * HALF_ROOT * side
             g_x = load * n_x + push_a * a_x + push_b * b_x
             g_y = load * n_y + push_a * a_y + push_b * b_y
             g_z = load * n_z + push_a * a_z + push_b * b_z
@@ -204,12 +233,9 @@ class Body:
                 if state == DRIVING:
                     wheel.control(dt)
                 wheel.turn(-push_a * wheel.rolling_radius, dt)
-        pybullet.applyExternalForce(
-            body, -1, (force_x, force_y, force_z), (px, py, pz), pybullet.WORLD_FRAME, physicsClientId=client
-        )
-        pybullet.applyExternalTorque(
-            body, -1, (torque_x, torque_y, torque_z), pybullet.WORLD_FRAME, physicsClientId=client
-        )
+        self.twist = 0.25 * twist
+        _apply_force(body, -1, (force_x, force_y, force_z), (px, py, pz), _WORLD_FRAME, client)
+        _apply_torque(body, -1, (torque_x, torque_y, torque_z), _WORLD_FRAME, client)
         # Encoder wheels: velocity of their ground point along +x and +y of the body.
         spin_f = wx * f_x + wy * f_y + wz * f_z
         spin_l = wx * l_x + wy * l_y + wz * l_z

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -167,6 +168,14 @@ class Sensor:
         self._pool = self._stream.standard_normal(3 * self._size, dtype=np.float32)
         self._sigmas = _sigma_table(parameters.gamma, parameters.shot_noise, parameters.read_noise)
         self._scratch = np.empty(self._shape, np.float32)
+
+    def save(self) -> dict[str, Any]:
+        """Take the state of the random stream."""
+        return dict(self._stream.bit_generator.state)
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Put back what `save` took."""
+        self._stream.bit_generator.state = dict(state)
 
     def sigma(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
         """Standard deviation of every pixel and channel, in 8-bit levels, of a picture by `Camera.light`."""

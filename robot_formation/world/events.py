@@ -86,4 +86,17 @@ class Frame:
     image: NDArray[np.uint8]
 
 
-Event: TypeAlias = JointStates | RobotPose | Frame
+@dataclass(frozen=True)
+class LeftPlate:
+    """A robot's reference dot has left the plate, seen from above; (x_m, y_m) is where it is in the world.
+
+    The robot is held there and takes no more commands.
+    """
+
+    robot: str
+    stamp_ns: int
+    x_m: float
+    y_m: float
+
+
+Event: TypeAlias = JointStates | RobotPose | Frame | LeftPlate

@@ -39,6 +39,11 @@ class Pose:
         x, y, z, w = self.orientation
         return math.atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
 
+    def place(self, point: Vector) -> Vector:
+        """World coordinates of a point of the frame, metres."""
+        x, y, z = rotate(self.orientation, point)
+        return (self.position[0] + x, self.position[1] + y, self.position[2] + z)
+
     def matrix(self) -> NDArray[np.float64]:
         """Rotation matrix (3, 3): columns are the frame's axes in the world."""
         x, y, z, w = self.orientation
@@ -71,6 +76,15 @@ def rotate(orientation: Quaternion, vector: Vector) -> Vector:
     # v + w t + q x t with t = 2 q x v
     t_x, t_y, t_z = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
     return (a + w * t_x + y * t_z - z * t_y, b + w * t_y + z * t_x - x * t_z, c + w * t_z + x * t_y - y * t_x)
+
+
+def off_plate(surface: Surface, robot: Pose, dot_height_m: float) -> tuple[float, float] | None:
+    """World x and y of a robot's reference dot if that lies, seen from above, beyond the plate's edge; else None.
+
+    The wheels may stand beside the plate: the ground's formula goes on there.
+    """
+    x, y, _ = robot.place((0.0, 0.0, dot_height_m))
+    return None if 0.0 <= x <= surface.size_m and 0.0 <= y <= surface.size_m else (x, y)
 
 
 def pose_on_surface(

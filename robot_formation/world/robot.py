@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from robot_formation.surface import Surface
 from robot_formation.world.body import Body
@@ -15,6 +16,8 @@ from robot_formation.world.pose import Pose, pose_on_surface, quaternion
 from robot_formation.world.wheel import HELD
 
 SETTLING_ROUNDS = 4
+
+_CHANGING = ("moving", "disturbed", "awake", "timed_out", "stranded", "_steps_moving", "_steps_resting")
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,13 @@ class RobotStart:
     heading_rad: float
     camera: bool = True
 
+    def pose(self, surface: Surface, parameters: WorldParameters) -> Pose:
+        """Pose of base_link with all wheels on the surface."""
+        wheels = parameters.wheels
+        return pose_on_surface(
+            surface, self.x_m, self.y_m, self.heading_rad, wheelbase_m=wheels.wheelbase_m, track_m=wheels.track_m
+        )
+
 
 class Robot:
     """State machine of one robot: standing (asleep or not) or in a motion that ends at rest.
@@ -36,6 +46,7 @@ class Robot:
         moving: a motion isn't over; awake: the body takes part in the physics.
         disturbed: the motion is not a command's but comes from another body's touch.
         timed_out: the last motion was braked because it took too long.
+        stranded: its reference dot has left the plate; it is held where it is and takes no commands.
     """
 
     def __init__(
@@ -48,6 +59,7 @@ class Robot:
         self.disturbed = False
         self.awake = True
         self.timed_out = False
+        self.stranded = False
         self._steps_moving = 0
         self._steps_resting = 0
         self._rest_steps = max(1, round(parameters.rest_time_s * parameters.physics_hz))
@@ -55,14 +67,7 @@ class Robot:
         self._stop_stream = generator(seed, start.name, "motor stop")
         self._surface = surface
         self.body = Body(surface, parameters, draw_imperfections(parameters.imperfections, seed, start.name), client)
-        self._first_pose = pose_on_surface(
-            surface,
-            start.x_m,
-            start.y_m,
-            start.heading_rad,
-            wheelbase_m=parameters.wheels.wheelbase_m,
-            track_m=parameters.wheels.track_m,
-        )
+        self._first_pose = start.pose(surface, parameters)
         self.body.place(self._first_pose)
 
     def settle(self, step: Callable[[], None]) -> None:
@@ -128,6 +133,34 @@ class Robot:
         for wheel in self.body.wheels:
             wheel.brake()
 
+    def strand(self) -> None:
+        """Hold the robot where it is, as somebody would who catches it at the edge."""
+        for wheel in self.body.wheels:
+            wheel.hold()
+        self.body.freeze()
+        self.moving = self.awake = False
+        self.stranded = True
+
+    def save(self) -> dict[str, Any]:
+        """Take everything that changes, but for Bullet's part of the body."""
+        return {
+            **{name: getattr(self, name) for name in _CHANGING},
+            "stop_stream": self._stop_stream.bit_generator.state,
+            "twist": self.body.twist,
+            "encoders": (tuple(self.body.encoder_angles), tuple(self.body.encoder_speeds)),
+            "wheels": tuple(wheel.save() for wheel in self.body.wheels),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Put back what `save` took."""
+        for name in _CHANGING:
+            setattr(self, name, state[name])
+        self._stop_stream.bit_generator.state = state["stop_stream"]
+        self.body.twist = state["twist"]
+        self.body.encoder_angles, self.body.encoder_speeds = (list(values) for values in state["encoders"])
+        for wheel, kept in zip(self.body.wheels, state["wheels"], strict=True):
+            wheel.restore(kept)
+
     def disturb(self) -> None:
         """Wake up because something touched the robot."""
         self.awake = True
@@ -137,15 +170,16 @@ class Robot:
 
     def _rests(self) -> bool:
         """Whether wheels and body have been slow for long enough; counts the steps."""
-        p = self.parameters
-        linear, angular = self.body.speed_squares()
-        slow = (
-            linear < p.rest_speed_m_s**2
-            and angular < p.rest_rate_rad_s**2
-            and all(wheel.state == HELD for wheel in self.body.wheels)
-        )
-        self._steps_resting = self._steps_resting + 1 if slow else 0
+        for wheel in self.body.wheels:
+            if wheel.state != HELD:
+                self._steps_resting = 0
+                return False
+        self._steps_resting = self._steps_resting + 1 if self._slow(*self.body.speed_squares()) else 0
         return self._steps_resting >= self._rest_steps
+
+    def _slow(self, linear: float, angular: float) -> bool:
+        """Whether squares of speed and turning rate count as rest."""
+        return linear < self.parameters.rest_speed_m_s**2 and angular < self.parameters.rest_rate_rad_s**2
 
     def finished(self) -> bool:
         """Count one step of the motion; True when it is over (then the robot sleeps, if it may)."""
@@ -164,8 +198,18 @@ class Robot:
         return True
 
     def pushed(self) -> bool:
-        """Whether a sleeping robot has been given a velocity by another body."""
-        return any(self.body.speed_squares())
+        """Whether another body has pushed a sleeping robot hard enough to wake it.
+
+        A lighter touch is held by its tyres. Without this limit two robots that press against each other would wake
+        each other for ever.
+        """
+        linear, angular = self.body.speed_squares()
+        if linear == angular == 0.0:
+            return False
+        if self.stranded or self._slow(linear, angular):
+            self.body.freeze()
+            return False
+        return True
 
     def joint_states(self, stamp_ns: int, *, final: bool) -> JointStates:
         """What the encoders say; velocities are zero in the final one."""

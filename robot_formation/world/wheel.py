@@ -3,12 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from robot_formation.world.parameters import MotorParameters
 
 HELD = 0
 DRIVING = 1
 BRAKING = 2
+
+_CHANGING = (
+    "angle",
+    "speed",
+    "bristle",
+    "state",
+    "drive",
+    "direction",
+    "_start",
+    "_stop_at",
+    "_profile",
+    "_integral",
+    "_time",
+    "_settled",
+)
 
 
 class Wheel:
@@ -25,9 +42,13 @@ class Wheel:
 
     __slots__ = (
         "_count",
+        "_damping",
+        "_friction",
         "_integral",
         "_p",
+        "_per_inertia",
         "_profile",
+        "_pwm",
         "_settled",
         "_start",
         "_stop_at",
@@ -47,9 +68,19 @@ class Wheel:
     )
 
     def __init__(
-        self, parameters: MotorParameters, centre: tuple[float, float, float], side: float, radius: float, gain: float
+        self,
+        parameters: MotorParameters,
+        centre: tuple[float, float, float],
+        side: float,
+        radius: float,
+        gain: float,
+        dt: float,
     ) -> None:
         self._p = parameters
+        self._pwm = parameters.drive_mode == "pwm_stop"
+        self._per_inertia = dt / parameters.inertia_kg_m2
+        self._damping = 1.0 + self._per_inertia * parameters.back_emf_n_m_s
+        self._friction = self._per_inertia * parameters.friction_n_m / self._damping
         self.x, self.y, self.z = centre
         self.side = side
         self.rolling_radius = radius
@@ -68,6 +99,15 @@ class Wheel:
         self._time = 0.0
         self._settled = 0
 
+    def save(self) -> dict[str, Any]:
+        """Take everything that changes."""
+        return {name: getattr(self, name) for name in _CHANGING}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Put back what `save` took."""
+        for name in _CHANGING:
+            setattr(self, name, state[name])
+
     def measured_angle(self) -> float:
         """Angle in whole encoder counts, radians."""
         return self._count * math.floor(self.angle / self._count + 0.5)
@@ -76,6 +116,11 @@ class Wheel:
         """Short the motor unless the wheel is held already."""
         if self.state == DRIVING:
             self.state = BRAKING
+
+    def hold(self) -> None:
+        """Stop the wheel on the spot."""
+        self.speed = 0.0
+        self.state = HELD
 
     def start_pwm(self, angle: float, speed: float, late: float) -> None:
         """Turn by `angle` rad with the PWM of no-load speed `speed` rad/s, stopping `late` rad after the count."""
@@ -98,7 +143,7 @@ class Wheel:
 
     def control(self, dt: float) -> None:
         """Firmware's turn, once per physics step while DRIVING: sets the motor torque or brakes."""
-        if self._p.drive_mode == "pwm_stop":
+        if self._pwm:
             if self.direction * (self.angle - self._start) >= self._stop_at:
                 self.state = BRAKING
             return
@@ -132,12 +177,9 @@ class Wheel:
         """Advance the shaft by one step, implicit in speed, under the ground's torque `load` (N m)."""
         if self.state == HELD:
             return
-        p = self._p
-        per_inertia = dt / p.inertia_kg_m2
         drive = self.drive if self.state == DRIVING else 0.0
-        damping = 1.0 + per_inertia * p.back_emf_n_m_s
-        free = (self.speed + per_inertia * (drive + load)) / damping
-        friction = per_inertia * p.friction_n_m / damping
+        free = (self.speed + self._per_inertia * (drive + load)) / self._damping
+        friction = self._friction
         if free > friction:
             speed = free - friction
         elif free < -friction:

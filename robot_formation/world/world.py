@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,17 +12,14 @@ from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
 from robot_formation.world.camera import Camera, Picture, Sensor
-from robot_formation.world.events import BodyState, Event, Frame, RobotPose
+from robot_formation.world.checks import Command, WorldError, check_command, check_setup
+from robot_formation.world.events import BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import Pose
+from robot_formation.world.pose import Pose, off_plate
 from robot_formation.world.robot import Robot, RobotStart
+from robot_formation.world.state import WorldState, restore_physics, save_physics
 
 MAX_FRAMES_OWED = 600
-WHEELS = 4
-
-
-class WorldError(ValueError):
-    """A command or request that the world refuses; nothing has moved."""
 
 
 class World:
@@ -34,24 +31,34 @@ class World:
 
     Attributes:
         step_count: physics steps since the start.
+        start_ns: simulated time at the start, nanoseconds.
         parameters: the parameters in force.
         surface: the ground.
     """
 
     def __init__(
-        self, surface: Surface, robots: Sequence[RobotStart], parameters: WorldParameters, *, seed: int
+        self,
+        surface: Surface,
+        robots: Sequence[RobotStart],
+        parameters: WorldParameters,
+        *,
+        seed: int,
+        start_ns: int = 0,
     ) -> None:
-        """Put the robots on the surface, at rest.
+        """Put the robots on the surface, at rest, at the simulated time `start_ns`.
 
         Raises:
-            WorldError: if names repeat, robots overlap, or lockstep names an unknown robot.
+            WorldError: if names repeat, robots overlap or would start beyond the plate, or lockstep names an unknown
+                robot.
         """
-        names = [robot.name for robot in robots]
-        _check_setup(names, parameters, seed)
+        check_setup(surface, robots, parameters, seed)
+        self.start_ns = start_ns
+        self._setup = repr((surface, tuple(robots), parameters, seed))
         self.surface = surface
         self.parameters = parameters
         self.step_count = 0
         self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._free = weakref.finalize(self, pybullet.disconnect, physicsClientId=self._client)
         pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=self._client)
         pybullet.setTimeStep(1.0 / parameters.physics_hz, physicsClientId=self._client)
         self._robots = {start.name: Robot(start, surface, parameters, seed, self._client) for start in robots}
@@ -60,7 +67,7 @@ class World:
             robot.settle(lambda: pybullet.stepSimulation(physicsClientId=self._client))
         self._frame_steps = parameters.physics_hz // parameters.camera.frame_rate_hz
         self._state_steps = parameters.physics_hz // parameters.state_rate_hz
-        self._pending: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
+        self._pending: dict[str, Command] = {}
         self._frames_owed = {start.name: 0 for start in robots if start.camera}
         self._camera = Camera(surface, parameters)
         self._sensors = {name: Sensor(parameters.camera, seed, name) for name in self._frames_owed}
@@ -76,16 +83,28 @@ class World:
     @property
     def stamp_ns(self) -> int:
         """Simulated time in nanoseconds, exact from the step counter."""
-        return self.step_count * 10**9 // self.parameters.physics_hz
+        return self.start_ns + self.step_count * 10**9 // self.parameters.physics_hz
 
     @property
     def owes(self) -> bool:
         """Whether a motion isn't at rest or requested frames are outstanding."""
-        return any(robot.moving for robot in self._robots.values()) or any(self._frames_owed.values())
+        for robot in self._robots.values():
+            if robot.moving:
+                return True
+        return any(self._frames_owed.values())
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether no robot is in a motion."""
+        return not any(robot.moving for robot in self._robots.values())
 
     def ground_truth(self, robot: str) -> BodyState:
         """True state of base_link: pose in the world, velocities in world axes."""
         return self._robot(robot).body.state()
+
+    def joint_states(self, robot: str) -> JointStates:
+        """What a standing robot's encoders say."""
+        return self._robot(robot).joint_states(self.stamp_ns, final=True)
 
     # --- commanding -------------------------------------------------------------------------------------------------
 
@@ -96,11 +115,13 @@ class World:
         the parameter lockstep start together, once each has a command.
 
         Raises:
-            WorldError: on an unknown robot, a wrong number of values, a value that is not finite, or a speed or angle
-                beyond the motor's limits. Nothing moves then.
+            WorldError: on an unknown robot, one that has left the plate, a wrong number of values, a value that is not
+                finite, or a speed or angle beyond the motor's limits. Nothing moves then.
         """
         target = self._robot(robot)
-        angles, speeds = self._check_command(robot, wheel_angles_rad, speed_limits_rad_s)
+        angles, speeds = check_command(robot, wheel_angles_rad, speed_limits_rad_s, self.parameters.motor)
+        if target.stranded:
+            raise WorldError(f"robot '{robot}' has left the plate and stays where it is; reset the world")
         lockstep = self.parameters.lockstep
         if robot not in lockstep or (target.moving and not target.disturbed):
             target.begin(angles, speeds)
@@ -131,40 +152,81 @@ class World:
     def advance(self) -> list[Event]:
         """Go on to the next instant at which something is published, and return it; empty if nothing is owed."""
         while self.owes:
-            if any(robot.awake for robot in self._robots.values()):
-                self._step_physics()
-            elif any(robot.moving for robot in self._robots.values()):
-                self.step_count += 1
-            else:
-                # All robots sleep: only the clock runs, up to the next frame.
-                self.step_count += self._frame_steps - self.step_count % self._frame_steps
-            events = self._motion_events()
-            if self.step_count % self._frame_steps == 0:
-                events += self._frames()
+            events = self._step()
             if events:
                 return events
         return []
 
+    def step(self) -> list[Event]:
+        """Go on by one physics step if anything is owed, and return what is published then.
+
+        Any mixture of `step` and `advance` gives the same events.
+        """
+        return self._step(skip=False) if self.owes else []
+
+    def save(self) -> WorldState:
+        """Take the whole state, from which `restore` goes on to the last bit."""
+        return WorldState(
+            self._setup,
+            self.start_ns,
+            self.step_count,
+            save_physics(self._client),
+            {name: robot.save() for name, robot in self._robots.items()},
+            {name: sensor.save() for name, sensor in self._sensors.items()},
+            dict(self._frames_owed),
+            dict(self._pending),
+        )
+
+    def restore(self, state: WorldState) -> None:
+        """Go back (or on) to a state that this world, or one of the same setup, was saved in.
+
+        Raises:
+            WorldError: if the state belongs to a world of another surface, robots, parameters or seed.
+        """
+        if state.setup != self._setup:
+            raise WorldError("the state is of a world of another setup: make one of the same surface, robots and seed")
+        restore_physics(self._client, state.physics)
+        self.start_ns, self.step_count = state.start_ns, state.step_count
+        for name, robot in self._robots.items():
+            robot.restore(state.robots[name])
+        for name, sensor in self._sensors.items():
+            sensor.restore(state.sensors[name])
+        self._frames_owed, self._pending = dict(state.frames_owed), dict(state.pending)
+
     def close(self) -> None:
         """Free the physics engine; the world can't be used afterwards."""
-        if self._client >= 0:
-            pybullet.disconnect(physicsClientId=self._client)
-            self._client = -1
+        self._free()
 
     # --- time -------------------------------------------------------------------------------------------------------
 
-    def _step_physics(self) -> None:
+    def _step(self, *, skip: bool = True) -> list[Event]:
+        """Make one step and return what is due then; with `skip` go straight to the next frame if all robots sleep."""
+        if not self._step_physics():
+            self.step_count += 1
+            if skip and not any(robot.moving for robot in self._robots.values()):
+                # Only the clock runs.
+                self.step_count += -self.step_count % self._frame_steps
+        events = self._motion_events()
+        if self.step_count % self._frame_steps == 0:
+            events += self._frames()
+        return events
+
+    def _step_physics(self) -> bool:
+        """Make one step if any robot is awake."""
         sleepers = []
         for robot in self._robots.values():
             if robot.awake:
                 robot.body.apply_ground_forces()
             else:
                 sleepers.append(robot)
-        pybullet.stepSimulation(physicsClientId=self._client)
+        if len(sleepers) == len(self._robots):
+            return False
+        pybullet.stepSimulation(self._client)
         self.step_count += 1
         for robot in sleepers:
             if robot.pushed():
                 robot.disturb()
+        return True
 
     def _motion_events(self) -> list[Event]:
         events: list[Event] = []
@@ -176,10 +238,16 @@ class World:
             final = robot.finished()
             if not (final or due):
                 continue
+            left = off_plate(self.surface, robot.body.pose(), self.parameters.marker.top_m)
+            if left is not None:
+                robot.strand()
+                final = True
             joints = robot.joint_states(stamp, final=final)
             if final or any(joints.velocities):
                 events.append(joints)
             events.append(RobotPose(name, stamp, robot.body.state(), final))
+            if left is not None:
+                events.append(LeftPlate(name, stamp, *left))
         return events
 
     def _frames(self) -> list[Event]:
@@ -210,30 +278,6 @@ class World:
             raise WorldError(f"no robot '{name}'{suggestion(name, self._robots)}")
         return robot
 
-    def _check_command(
-        self, robot: str, angles: Sequence[float], speeds: Sequence[float]
-    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        motor = self.parameters.motor
-        checked = tuple(float(value) for value in angles), tuple(float(value) for value in speeds)
-        if any(len(values) != WHEELS for values in checked):
-            raise WorldError(
-                f"robot '{robot}': a command needs four wheel angles and four speed limits, "
-                f"not {len(checked[0])} and {len(checked[1])}"
-            )
-        if not all(math.isfinite(value) for values in checked for value in values):
-            raise WorldError(f"robot '{robot}': wheel angles and speed limits must be finite numbers")
-        for angle, speed in zip(*checked, strict=True):
-            if abs(angle) > motor.max_angle_rad:
-                raise WorldError(
-                    f"robot '{robot}': a wheel angle of {angle:g} rad is beyond {motor.max_angle_rad:g} rad; split it"
-                )
-            if angle != 0.0 and not 0.0 < speed <= motor.max_speed_rad_s:
-                raise WorldError(
-                    f"robot '{robot}': a speed limit of {speed:g} rad/s is outside what the motor can do; "
-                    f"give more than 0 and at most {motor.max_speed_rad_s:g} rad/s"
-                )
-        return checked
-
     def _check_overlap(self) -> None:
         robots = list(self._robots.values())
         for i, a in enumerate(robots):
@@ -241,14 +285,3 @@ class World:
                 if pybullet.getClosestPoints(a.body.index, b.body.index, 0.0, physicsClientId=self._client):
                     self.close()
                     raise WorldError(f"robots '{a.name}' and '{b.name}' overlap at their starts; move them apart")
-
-
-def _check_setup(names: Sequence[str], parameters: WorldParameters, seed: int) -> None:
-    for name in names:
-        if not name or names.count(name) > 1:
-            raise WorldError(f"robot names must be non-empty and different; '{name}' is not")
-    for name in parameters.lockstep:
-        if name not in names:
-            raise WorldError(f"world: 'lockstep' names no robot '{name}'{suggestion(name, names)}")
-    if seed < 0:
-        raise WorldError(f"the seed must be 0 or larger, not {seed}")

@@ -1,0 +1,123 @@
+"""Transforms for viewers, made from what a bag holds anyway: true poses and robot descriptions.
+
+`/tf` has world -> <robot>/base_link at every true pose. `/tf_static` has the frames of each robot's description (wheels
+at rest) and world -> <robot>/odom, where the robot started.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from robot_formation import names
+from robot_formation.bag.definitions import jazzy_typestore
+
+_POSES = re.compile(r".*/ground_truth/([^/]+)/odom")
+_DESCRIPTIONS = re.compile(r".*/([^/]+)/robot_description")
+_ODOMETRY, _STRING = "nav_msgs/msg/Odometry", "std_msgs/msg/String"
+
+Vector = tuple[float, float, float]
+
+
+class TransformMessage(NamedTuple):
+    """One serialised message of `/tf` or `/tf_static`."""
+
+    topic: names.Topic
+    cdr: bytes
+    stamp_ns: int
+
+
+class Transforms:
+    """Collects messages as they are recorded, cheaply, and makes transforms of them when asked."""
+
+    def __init__(self) -> None:
+        self._taken: list[tuple[str, str, bytes, int]] = []
+        self._static: dict[str, Any] = {}
+
+    def take(self, topic: str, type_name: str, cdr: bytes, stamp_ns: int) -> None:
+        """Keep a message if it says where a frame is."""
+        pattern = {_ODOMETRY: _POSES, _STRING: _DESCRIPTIONS}.get(type_name)
+        if pattern is not None and (match := pattern.fullmatch(topic)):
+            self._taken.append((match[1], type_name, cdr, stamp_ns))
+
+    def make(self) -> Iterator[TransformMessage]:
+        """Make the transforms of what was taken since the last time."""
+        taken, self._taken = self._taken, []
+        new: list[int] = []
+        for robot, type_name, cdr, stamp_ns in taken:
+            message = jazzy_typestore().deserialize_cdr(cdr, type_name)
+            if type_name == _STRING:
+                fixed = list(_of_description(robot, message.data))
+            else:
+                transform = _of_odometry(message)
+                yield _message(names.TF, [transform], stamp_ns)
+                fixed = [_transform(message.header, f"{robot}/{names.ODOM_FRAME}", transform.transform)]
+            for transform in fixed:
+                if transform.child_frame_id not in self._static:
+                    self._static[transform.child_frame_id] = transform
+                    new.append(stamp_ns)
+        # All of them each time: whoever asks for the latest message on a latched topic gets one only.
+        if new:
+            yield _message(names.TF_STATIC, list(self._static.values()), min(new))
+
+
+def _of_odometry(message: Any) -> Any:
+    types = jazzy_typestore().types
+    pose = message.pose.pose
+    place = types["geometry_msgs/msg/Vector3"](pose.position.x, pose.position.y, pose.position.z)
+    turn = types["geometry_msgs/msg/Transform"](place, pose.orientation)
+    return _transform(message.header, message.child_frame_id, turn)
+
+
+def _of_description(robot: str, text: str) -> Iterator[Any]:
+    """Make one transform per joint of a URDF; a text that is none gives none."""
+    types = jazzy_typestore().types
+    try:
+        joints = ElementTree.fromstring(text).iter("joint")
+    except ElementTree.ParseError:
+        return
+    for joint in joints:
+        parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
+        if parent is None or child is None:
+            continue
+        place, turn = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        if origin is not None:
+            place, turn = _vector(origin.get("xyz", "0 0 0")), _vector(origin.get("rpy", "0 0 0"))
+        header = types["std_msgs/msg/Header"](
+            types["builtin_interfaces/msg/Time"](0, 0), f"{robot}/{parent.get('link', '')}"
+        )
+        transform = types["geometry_msgs/msg/Transform"](
+            types["geometry_msgs/msg/Vector3"](*place), types["geometry_msgs/msg/Quaternion"](*_quaternion(*turn))
+        )
+        yield _transform(header, f"{robot}/{child.get('link', '')}", transform)
+
+
+def _vector(text: str) -> Vector:
+    x, y, z = (float(number) for number in text.split())
+    return (x, y, z)
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """Unit quaternion (x, y, z, w) of URDF's fixed-axis roll, pitch, yaw."""
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def _transform(header: Any, child: str, transform: Any) -> Any:
+    return jazzy_typestore().types["geometry_msgs/msg/TransformStamped"](header, child, transform)
+
+
+def _message(topic: names.Topic, transforms: list[Any], stamp_ns: int) -> TransformMessage:
+    store = jazzy_typestore()
+    message = store.types[topic.type](transforms)
+    return TransformMessage(topic, bytes(store.serialize_cdr(message, topic.type)), stamp_ns)

@@ -1,0 +1,235 @@
+"""`formation calibrate`: measure a robot's motors and sensing wheels against the one-point reference."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robot_formation.errors import FormationError
+
+if TYPE_CHECKING:
+    from robot_formation.experiment.calibration_course import Course
+    from robot_formation.experiment.scenario import Scenario
+
+DESCRIPTION = "Measure the robots of a scenario, each alone in the middle of the plate, in one process."
+MOTORS_DESCRIPTION = """\
+Drive each robot of the scenario over preset wheel rotations (followers along v and u, the leader along v, and turns),
+measure the distances by the reference dot, fit the calibration curves, and write them to motors.yaml with a picture
+(motors.png). 'formation run --set drive.calibration_file=FILE' uses them.
+"""
+ENCODERS_DESCRIPTION = """\
+Drive a robot over preset distances along v and u and compare what its motors' encoders, its sensing wheels and the
+reference dot say (encoders.png). --set drive.calibration_file=FILE takes the robot's own calibration curves.
+"""
+CALIBRATION_FILE = "motors.yaml"
+MOTORS_PICTURE = "motors.png"
+ENCODERS_PICTURE = "encoders.png"
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb and what it calibrates to the command line."""
+    parser = subparsers.add_parser(
+        "calibrate", help="measure motors or encoders of a scenario's robots", description=DESCRIPTION
+    )
+    whats = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
+    motors = whats.add_parser("motors", help="fit wheel rotation to distance", description=MOTORS_DESCRIPTION)
+    _add_options(motors, repeats=10)
+    motors.set_defaults(run=run_motors)
+    encoders = whats.add_parser("encoders", help="compare the instruments", description=ENCODERS_DESCRIPTION)
+    encoders.add_argument("--robot", metavar="NAME", default="follower_1", help="which robot (default: follower_1)")
+    _add_options(encoders, repeats=5)
+    encoders.set_defaults(run=run_encoders)
+
+
+def _add_options(parser: argparse.ArgumentParser, *, repeats: int) -> None:
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--track", metavar="NAME", help="preset track whose robots are measured: one, two (default), ...")
+    what.add_argument("--scenario", metavar="FILE", type=Path, help="scenario file whose robots are measured")
+    parser.add_argument("--seed", metavar="N", type=int, help="seed that the robots are drawn from")
+    parser.add_argument("--surface", metavar="NAME", default="plane", help="ground to measure on (default: plane)")
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], help="any parameter, as in 'run'; may be repeated"
+    )
+    parser.add_argument(
+        "--repeats",
+        metavar="N",
+        type=_whole,
+        default=repeats,
+        help=f"times each drive is made forth and back (default: {repeats})",
+    )
+    parser.add_argument(
+        "--reference-noise",
+        metavar="M",
+        type=_length,
+        default=0.0,
+        help="standard deviation of the observer's x and y, in metres (default: 0)",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder for the files (default: calibrations/SCENARIO_seedN)"
+    )
+    parser.add_argument("--force", action="store_true", help="replace files of an older calibration")
+    parser.add_argument("--json", action="store_true", help="print JSON and nothing else on standard output")
+
+
+def run_motors(args: argparse.Namespace) -> int:
+    """Measure, fit, store, draw and print; return 0.
+
+    Raises:
+        FormationError: on anything wrong in the arguments, on files in the way, or if a curve can't be fitted.
+    """
+    from robot_formation.analysis.calibration_figures import draw_motors
+    from robot_formation.analysis.calibration_report import motors_json, motors_text
+    from robot_formation.control.calibration import MotorCalibration, save_calibration
+    from robot_formation.control.drive import DriveParameters
+    from robot_formation.experiment.calibration_motors import calibrate_motors, curves
+    from robot_formation.experiment.drive_curves import robot_facts
+    from robot_formation.parameters import from_mapping
+
+    scenario = build_scenario(args, with_curves=False)
+    folder = free_folder(args, scenario, (CALIBRATION_FILE, MOTORS_PICTURE))
+    drive = from_mapping(DriveParameters, scenario.parameters("drive"), where="drive")
+    course = make_course(args, scenario)
+    fits = calibrate_motors(course, scenario.robots, drive, args.repeats, _say)
+    conditions = {**_conditions(args, scenario), **robot_facts(scenario)}
+    save_calibration(folder / CALIBRATION_FILE, MotorCalibration(curves(fits).robots, conditions))
+    picture = draw_motors(fits, f"Motor calibration · {_told(args, scenario)}", folder / MOTORS_PICTURE)
+    if args.json:
+        said = {**_conditions(args, scenario), "file": str(folder / CALIBRATION_FILE), "picture": str(picture)}
+        print(json.dumps({**said, "robots": motors_json(fits)}, indent=2, allow_nan=False))
+        return 0
+    print(f"motor calibration: {_told(args, scenario)}\n\n{motors_text(fits)}\n")
+    print(f"curves: {folder / CALIBRATION_FILE}\npicture: {picture}")
+    setting = f"drive.calibration_file={folder / CALIBRATION_FILE}"
+    print(f"to use them: formation run --seed {scenario.setup.seed} --set {setting}")
+    return 0
+
+
+def run_encoders(args: argparse.Namespace) -> int:
+    """Measure, compare, draw and print; return 0.
+
+    Raises:
+        FormationError: on anything wrong in the arguments, on files in the way, or if a drive can't be measured.
+    """
+    from robot_formation.analysis.calibration_figures import draw_encoders
+    from robot_formation.analysis.calibration_report import encoders_json, encoders_text
+    from robot_formation.control.distance_comparison import compare_distances
+    from robot_formation.control.drive import DriveParameters
+    from robot_formation.experiment.calibration_encoders import measure_encoders
+    from robot_formation.experiment.drive_curves import describe_curves
+    from robot_formation.parameters import from_mapping, suggestion
+
+    scenario = build_scenario(args, with_curves=True)
+    if args.robot not in scenario.robots:
+        raise FormationError(f"the scenario has no robot '{args.robot}'{suggestion(args.robot, scenario.robots)}")
+    folder = free_folder(args, scenario, (ENCODERS_PICTURE,))
+    drive = from_mapping(DriveParameters, scenario.parameters("drive"), where="drive")
+    _say(describe_curves(scenario))
+    course = make_course(args, scenario)
+    comparisons = compare_distances(measure_encoders(course, args.robot, drive, args.repeats, _say))
+    title = f"{args.robot.replace('_', ' ')}, travelled distances · {_told(args, scenario)}"
+    picture = draw_encoders(comparisons, title, folder / ENCODERS_PICTURE)
+    if args.json:
+        said = {"robot": args.robot, **_conditions(args, scenario), "picture": str(picture)}
+        said["calibration_file"] = drive.calibration_file or None
+        print(json.dumps({**said, "distances": encoders_json(comparisons)}, indent=2, allow_nan=False))
+        return 0
+    print(f"{args.robot}: {_told(args, scenario)}\n\n{encoders_text(comparisons)}\n\npicture: {picture}")
+    return 0
+
+
+def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
+    """Put the scenario together whose robots are measured, on the ground to measure on.
+
+    Without curves, the calibration file that it names is left out: it may be what is to be measured only now.
+
+    Raises:
+        FormationError: naming what is misspelt or out of range.
+    """
+    from robot_formation.experiment import scenario as scenarios
+
+    file = args.scenario
+    scenario = scenarios.load(file) if file is not None else scenarios.load_track(args.track or "two")
+    scenario = scenarios.with_surface(scenario, args.surface)
+    if args.seed is not None:
+        scenario = scenarios.with_value(scenario, "seed", args.seed)
+    scenario = scenarios.override(scenario, args.set)
+    if not with_curves:
+        scenario = scenarios.with_value(scenario, "drive.calibration_file", "")
+    scenario.check()
+    return scenario
+
+
+def make_course(args: argparse.Namespace, scenario: Scenario) -> Course:
+    """Make the course of the scenario's ground and robots."""
+    from robot_formation.components.catalogue import KINDS
+    from robot_formation.experiment.calibration_course import Course
+    from robot_formation.parameters import from_mapping
+
+    world = from_mapping(KINDS["world"].parameter_class(), scenario.parameters("world"), where="world")
+    return Course(world.make_surface(), world, scenario.setup.seed, args.reference_noise)
+
+
+def free_folder(args: argparse.Namespace, scenario: Scenario, files: tuple[str, ...]) -> Path:
+    """Make the output folder.
+
+    Raises:
+        FormationError: if one of the files is there already and --force isn't given, or the folder can't be made.
+    """
+    from robot_formation.paths import default_calibrations_dir
+
+    folder: Path = args.out or default_calibrations_dir() / f"{scenario.setup.name}_seed{scenario.setup.seed}"
+    for name in files:
+        if (folder / name).exists() and not args.force:
+            raise FormationError(
+                f"{folder / name} exists already and is not overwritten; choose another folder with --out, or "
+                "replace it with --force"
+            )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FormationError(f"{folder} can't be made: {error.strerror}; choose another folder with --out") from error
+    return folder
+
+
+def _conditions(args: argparse.Namespace, scenario: Scenario) -> dict[str, Any]:
+    return {
+        "scenario": scenario.setup.name,
+        "seed": scenario.setup.seed,
+        "surface": scenario.parameters("world")["surface"],
+        "repeats": args.repeats,
+        "reference_noise_m": args.reference_noise,
+    }
+
+
+def _told(args: argparse.Namespace, scenario: Scenario) -> str:
+    said = [f"seed {scenario.setup.seed}", scenario.parameters("world")["surface"], f"{args.repeats} times each way"]
+    said += [f"reference noise {args.reference_noise * 1e3:g} mm"] if args.reference_noise else []
+    return ", ".join(said)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _whole(text: str) -> int:
+    return int(_within(text, 1, 1000, "a whole number from 1 to 1000", int))
+
+
+def _length(text: str) -> float:
+    return _within(text, 0.0, 0.1, "a length from 0 to 0.1 m", float)
+
+
+def _within(text: str, low: float, high: float, what: str, kind: Callable[[str], float]) -> float:
+    """Convert for argparse, which turns the error into one line."""
+    try:
+        value = kind(text)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:  # nor is NaN
+        raise argparse.ArgumentTypeError(f"{text!r} is not {what}")
+    return value

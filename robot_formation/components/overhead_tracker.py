@@ -1,0 +1,85 @@
+"""Overhead tracker: follows the robots' white dots in the pictures from above. It never reads ground truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from robot_formation import conversions, names
+from robot_formation.components.base import Component, Input, Place
+from robot_formation.parameters import ParameterError, parameter
+from robot_formation.surface import surface_from_texts
+from robot_formation.vision.overhead_tracking import OverheadTracker, OverheadTrackingParameters
+
+
+@dataclass(frozen=True)
+class OverheadTrackerNodeParameters(OverheadTrackingParameters):
+    """The tracker's own parameters, which robots there are, where they start, and the ground as far as it is known."""
+
+    robots: tuple[str, ...] = parameter(("leader", "follower_1"), "Names of the robots, in the order of the poses")
+    start_x_m: tuple[float, ...] = parameter(
+        (0.76, 1.08), "Start of each robot's base_link in the world", unit="m", low=-10.0, high=100.0
+    )
+    start_y_m: tuple[float, ...] = parameter(
+        (0.16, 0.16), "Start of each robot's base_link in the world", unit="m", low=-10.0, high=100.0
+    )
+    surface: str = parameter("bowl", "Name of the surface that a calibration with knows_surface means")
+    surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
+
+    def __post_init__(self) -> None:
+        """Check that every robot has a start."""
+        lengths = {len(self.start_x_m), len(self.start_y_m), len(self.robots)}
+        if len(lengths) != 1 or len(set(self.robots)) != len(self.robots):
+            raise ParameterError("overhead_tracker: 'robots' must differ and have one start_x_m and start_y_m each")
+
+
+class OverheadTrackerComponent(Component):
+    """Answers each picture with the places of all robots' dots, and with the paths of those that were seen."""
+
+    def __init__(self, parameters: OverheadTrackerNodeParameters, place: Place) -> None:
+        super().__init__(place)
+        surface = surface_from_texts(parameters.surface, parameters.surface_parameters)
+        places = zip(parameters.start_x_m, parameters.start_y_m, strict=True)
+        self._tracker = OverheadTracker(parameters, surface, dict(zip(parameters.robots, places, strict=True)))
+        self._path_topics = {robot: names.overhead_path(robot) for robot in parameters.robots}
+        self._paths: dict[str, list[Any]] = {robot: [] for robot in parameters.robots}
+        self._pictures = 0
+        self._unseen: list[str] = []
+
+    def inputs(self) -> list[Input]:
+        """See `Component`."""
+        return [Input(names.OVERHEAD_IMAGE, self._on_image)]
+
+    def outputs(self) -> list[names.Topic]:
+        """See `Component`."""
+        return [names.OVERHEAD_POSES, *self._path_topics.values()]
+
+    def details(self) -> dict[str, str]:
+        """See `Component`."""
+        return {"pictures": str(self._pictures), "unseen": ", ".join(self._unseen)}
+
+    def _on_image(self, message: Any) -> None:
+        try:
+            picture = conversions.read_grey_image(message)
+        except conversions.MessageError as error:
+            self.warn(str(error))
+            return
+        stamp_ns = conversions.stamp_of(message)
+        earlier = stamp_ns < self.stamp_ns
+        if earlier:
+            self._tracker.restart()
+        self.stamp_ns = stamp_ns
+        self._pictures += 1
+        found = self._tracker.update(picture)
+        if earlier or self._tracker.restarted:
+            self._paths = {robot: [] for robot in self._paths}
+        self._unseen = [robot for robot in self._paths if robot not in found]
+        frame = names.WORLD_FRAME
+        poses = {
+            robot: conversions.place(track.place.tolist(), frame, stamp_ns)
+            for robot, track in self._tracker.tracks.items()
+        }
+        self._send(names.OVERHEAD_POSES, conversions.pose_array(list(poses.values()), frame, stamp_ns))
+        for robot in found:
+            self._paths[robot].append(poses[robot])
+            self._send(self._path_topics[robot], conversions.path(self._paths[robot], frame, stamp_ns))

@@ -1,0 +1,14 @@
+"""The `overhead_tracker` executable; what the node does is in components/overhead_tracker.py."""
+
+from __future__ import annotations
+
+from robot_formation.nodes.host import main_of
+
+
+def main() -> int:
+    """Run the node until it ends."""
+    return main_of("overhead_tracker")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

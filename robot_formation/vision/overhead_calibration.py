@@ -1,0 +1,128 @@
+"""From pixels of the overhead camera to places in the world, by the calibration that the tracker has been given."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation.parameters import parameter
+from robot_formation.surface import Surface
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 20
+_CLOSE_M = 1e-6
+_STANCE_DIRECTIONS = [(math.cos(math.pi * k / 4), math.sin(math.pi * k / 4)) for k in range(8)]
+_UNDISTORT_STOP = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-9)
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a calibration holds: lens, place of the camera, and what is taken for the ground.
+
+    The camera looks straight down with its columns along the world's x; its distortion is OpenCV's model with five
+    coefficients. These defaults are the true values of the simulated camera: the good calibration.
+    """
+
+    focal_length_px: float = parameter(560.0, "focal length in x and y", unit="px", low=10.0, high=1e5)
+    centre_x_px: float = parameter(257.3, "column of the optical axis", unit="px", low=-1e4, high=1e4)
+    centre_y_px: float = parameter(254.1, "row of the optical axis", unit="px", low=-1e4, high=1e4)
+    k1: float = parameter(-0.12, "radial distortion, second order", low=-1.0, high=1.0)
+    k2: float = parameter(0.02, "radial distortion, fourth order", low=-1.0, high=1.0)
+    p1: float = parameter(0.0006, "tangential distortion along rows", low=-0.1, high=0.1)
+    p2: float = parameter(-0.0004, "tangential distortion along columns", low=-0.1, high=0.1)
+    k3: float = parameter(0.0, "radial distortion, sixth order", low=-1.0, high=1.0)
+    x_m: float = parameter(0.89, "lens in the world", unit="m", low=-100.0, high=100.0)
+    y_m: float = parameter(0.89, "lens in the world", unit="m", low=-100.0, high=100.0)
+    z_m: float = parameter(2.5, "lens in the world", unit="m", low=0.3, high=100.0)
+    knows_surface: bool = parameter(True, "true: robots stand on the surface; false: on a level plane")
+    plane_m: float = parameter(0.0, "height of that plane", unit="m", low=-10.0, high=10.0)
+    stance_m: float = parameter(
+        0.145,
+        "distance of the wheels from base_link: how far a robot's origin hangs above a hollow",
+        unit="m",
+        low=0.0,
+        high=2.0,
+    )
+
+
+@dataclass(frozen=True)
+class ImperfectCalibration(Calibration):
+    """A calibration as the paper's must have been: distortion only partly known, and the plate taken for level."""
+
+    centre_x_px: float = parameter(
+        255.5, "column of the optical axis: the picture's middle", unit="px", low=-1e4, high=1e4
+    )
+    centre_y_px: float = parameter(
+        255.5, "row of the optical axis: the picture's middle", unit="px", low=-1e4, high=1e4
+    )
+    k1: float = parameter(-0.09, "radial distortion, second order", low=-1.0, high=1.0)
+    k2: float = parameter(0.0, "radial distortion, fourth order", low=-1.0, high=1.0)
+    p1: float = parameter(0.0, "tangential distortion along rows", low=-0.1, high=0.1)
+    p2: float = parameter(0.0, "tangential distortion along columns", low=-0.1, high=0.1)
+    knows_surface: bool = parameter(False, "true: robots stand on the surface; false: on a level plane")
+    plane_m: float = parameter(0.1, "height of that plane", unit="m", low=-10.0, high=10.0)
+
+
+class Locator:
+    """Gives the place in the world of a reference dot seen at a pixel."""
+
+    def __init__(self, calibration: Calibration, surface: Surface, dot_height_m: float) -> None:
+        c = calibration
+        self.calibration = c
+        self._surface = surface
+        self._dot_height_m = dot_height_m
+        self._matrix = np.array(
+            [[c.focal_length_px, 0.0, c.centre_x_px], [0.0, c.focal_length_px, c.centre_y_px], [0.0, 0.0, 1.0]]
+        )
+        self._distortion = np.array([c.k1, c.k2, c.p1, c.p2, c.k3])
+
+    def places(self, pixels: Array) -> Array:
+        """World places (n, 3) in metres of dots at pixels (n, 2) (column, row): where their rays meet their height."""
+        if len(pixels) == 0:
+            return np.empty((0, 3))
+        points = np.asarray(pixels, float).reshape(-1, 1, 2)
+        rays = cv2.undistortPoints(points, self._matrix, self._distortion, criteria=_UNDISTORT_STOP).reshape(-1, 2)
+        return np.array([self._meet(float(x), -float(y)) for x, y in rays])
+
+    def place_of(self, x_m: float, y_m: float) -> Array:
+        """Place (3,) of the dot of a robot whose base_link is at (x, y)."""
+        return np.array(self._dot(x_m, y_m))
+
+    def area_px(self, place: Array, radius_m: float) -> float:
+        """Expected area of a dot's picture, pixels."""
+        scale = self.calibration.focal_length_px / max(0.1, self.calibration.z_m - float(place[2]))
+        return math.pi * (radius_m * scale) ** 2
+
+    def _meet(self, slope_x: float, slope_y: float) -> tuple[float, float, float]:
+        """Follow a ray (metres sideways per metre down) to the dot's height.
+
+        The height depends on the place; as the ray is steep and the ground is not, each round cuts the error to a
+        tenth or less.
+        """
+        c = self.calibration
+        base_x, base_y = c.x_m, c.y_m
+        x, y, z = self._dot(base_x, base_y)
+        for _ in range(_ROUNDS):
+            seen_x, seen_y = c.x_m + (c.z_m - z) * slope_x, c.y_m + (c.z_m - z) * slope_y
+            off_x, off_y = seen_x - x, seen_y - y
+            if abs(off_x) + abs(off_y) < _CLOSE_M:
+                break
+            base_x, base_y = base_x + off_x, base_y + off_y
+            x, y, z = self._dot(base_x, base_y)
+        return (c.x_m + (c.z_m - z) * slope_x, c.y_m + (c.z_m - z) * slope_y, z)
+
+    def _dot(self, base_x: float, base_y: float) -> tuple[float, float, float]:
+        c = self.calibration
+        if not c.knows_surface:
+            return (base_x, base_y, c.plane_m + self._dot_height_m)
+        ground = sum(
+            self._surface.height(base_x + c.stance_m * dx, base_y + c.stance_m * dy) for dx, dy in _STANCE_DIRECTIONS
+        ) / len(_STANCE_DIRECTIONS)
+        n_x, n_y, n_z = self._surface.normal(base_x, base_y)
+        d = self._dot_height_m
+        return (base_x + d * n_x, base_y + d * n_y, ground + d * n_z)
