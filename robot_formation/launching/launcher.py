@@ -48,7 +48,7 @@ class Launcher:
         bag: where the recorder writes; None records nothing.
         images: whether pictures are recorded too.
         say: takes the lines of progress.
-        silence_s: wall seconds without any sign of life after which the run is given up.
+        silence_s: wall seconds without any sign of life after which the run is given up; longer in slow motion.
         callback_delay_s: longest random delay before each callback of every node (tests).
         on_start: called once all processes run, with the ROS domain and the process ids by node name (tests).
     """
@@ -112,6 +112,8 @@ class Launcher:
 
         began = time.monotonic()
         setup, timesteps = self.scenario.setup, self.scenario.parameters("leader")["timesteps"]
+        factor = self.scenario.parameters("world")["real_time_factor"]
+        silence_s = self.silence_s / (min(factor, 1.0) or 1.0)
         progress = Progress(setup.followers, timesteps, self.say, lambda: time.monotonic() - began)
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:
@@ -129,8 +131,8 @@ class Launcher:
                 if ended is not None:
                     monitor.spin(_POLL_S)
                     return self._verdict(ended)
-                if now - last > self.silence_s:
-                    return NODE_DIED_EXIT_CODE, f"no node has shown a sign of life for {self.silence_s:.0f} s"
+                if now - last > silence_s:
+                    return NODE_DIED_EXIT_CODE, f"no node has shown a sign of life for {silence_s:.0f} s"
 
     def _verdict(self, ended: Child) -> tuple[int, str]:
         code, executable = ended.exit_code, ended.process.executable
