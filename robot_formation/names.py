@@ -6,6 +6,7 @@ to the formation as a whole lies under the namespace given by the parameter `for
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from robot_formation.errors import FormationError
@@ -61,8 +62,8 @@ def beacon_neighbour(robot: str) -> str:
     Raises:
         FormationError: if the robot is no follower.
     """
-    prefix, _, number = robot.partition("_")
-    if prefix != "follower" or not number.isdigit() or int(number) < 1:
+    number = robot.removeprefix("follower_")
+    if not re.fullmatch("follower_[1-9][0-9]*", robot):
         raise FormationError(f"'{robot}' is no follower: followers are called follower_1, follower_2, ...")
     return LEADER if number == "1" else follower(int(number) - 1)
 

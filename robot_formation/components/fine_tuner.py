@@ -58,7 +58,8 @@ class FineTunerComponent(Component):
         self._act(self._tuner.neighbour_done(int(message.data)))
 
     def _on_prediction(self, message: Any) -> None:
-        self._act(self._tuner.prediction(conversions.read_displacement(message)))
+        known = conversions.has_estimate(message)
+        self._act(self._tuner.prediction(conversions.read_displacement(message) if known else None))
 
     def _on_moved(self, message: Any) -> None:
         self._act(self._tuner.moved(conversions.read_displacement(message), conversions.stamp_of(message)))

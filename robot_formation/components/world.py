@@ -143,6 +143,10 @@ class WorldComponent(Component):
         for event in events:
             self._publish(event)
 
+    def close(self) -> None:
+        """See `Component`."""
+        self._world.close()
+
     def details(self) -> dict[str, str]:
         """See `Component`."""
         return {"simulated time [s]": f"{self._world.stamp_ns / 1e9:.3f}", "owes": str(self._world.owes)}

@@ -70,6 +70,13 @@ class InProcessRun:
         Raises:
             RunError: if everybody waits for somebody, which no run should come to.
         """
+        try:
+            return self._run()
+        finally:
+            for hosted in self._hosted:
+                hosted.component.close()
+
+    def _run(self) -> tuple[int, str]:
         for hosted in self._hosted:
             hosted.component.start()
         world = self._hosted[0].component

@@ -165,6 +165,7 @@ class Host:
             for publisher in self._publishers.values():
                 publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
             executor.shutdown()
+            component.close()
         return component.exit_code or 0
 
     def _delayed(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.errors import FormationError
 from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
@@ -21,7 +22,7 @@ MAX_FRAMES_OWED = 600
 WHEELS = 4
 
 
-class WorldError(ValueError):
+class WorldError(FormationError):
     """A command or request that the world refuses; nothing has moved."""
 
 
