@@ -137,7 +137,10 @@ def check(spec: Spec, value: Any, *, where: str) -> Any:
     if spec.type in _ELEMENTS:
         if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
             raise ParameterError(f"{where}: '{spec.name}' must be a list, not {value!r}")
-        return tuple(_check_one(spec, _ELEMENTS[spec.type], item, where) for item in value)
+        items = tuple(_check_one(spec, _ELEMENTS[spec.type], item, where) for item in value)
+        if spec.default and not items:
+            raise ParameterError(f"{where}: '{spec.name}' must not be empty")
+        return items
     kind = spec.type
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
         raise TypeError(f"{spec.name}: optional parameters are not supported; use a neutral default")

@@ -5,8 +5,7 @@ import math
 import pytest
 from component_helpers import wired
 
-from robot_formation import conversions
-from robot_formation.components.fine_tuner import LOST_EXIT_CODE
+from robot_formation import conversions, exit_codes
 from robot_formation.control.alignment import FRONT, TARGET, AlignmentParameters, PaperAlignment
 from robot_formation.control.motion import Motion
 from robot_formation.vision.block import Block
@@ -86,7 +85,7 @@ def test_the_second_follower_listens_to_the_first_and_not_to_the_leader():
     assert OWN in wire.inputs
     assert NEIGHBOUR not in wire.inputs
     (done,) = [topic for topic in wire.component.outputs() if topic.name == "/formation/follower_2/done"]
-    assert done.listeners == 0
+    assert done.listeners == ()
 
 
 def cut_off(message):
@@ -126,5 +125,5 @@ def test_a_lost_leader_ends_the_run_with_the_exit_code_for_it():
     wire = wired("fine_tuner", "follower_1", look=LOOK, alignment={"max_empty_looks": 1})
     wire.give(NEIGHBOUR, tick(0))
     assert plain(wire.give("blocks", blocks([], 10))) == [("alignment", "lost")]
-    assert wire.component.exit_code == LOST_EXIT_CODE == 3
+    assert wire.component.exit_code == exit_codes.LOST == 3
     assert wire.component.exit_reason == "follower_1 lost its beacon neighbour in timestep 0"

@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from robot_formation.components.catalogue import KINDS
+from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as module
 from robot_formation.experiment.scenario import (
@@ -135,7 +136,7 @@ def test_the_same_length_has_the_same_value_in_every_node(track_two):
     assert tuner["alignment.max_v_step_m"] <= drive["max_v_m"]
     assert tuner["alignment.max_u_step_m"] <= drive["max_u_m"]
     assert tuner["first_step_m"] == track_two.parameters("leader")["step_m"]
-    lens_to_face = module.FORMATION_DISTANCE_M - world["marker.edge_m"] / 2 - world["camera.y_m"]
+    lens_to_face = FORMATION_DISTANCE_M - world["marker.edge_m"] / 2 - world["camera.y_m"]
     assert tuner["alignment.distance_m"] == pytest.approx(lens_to_face)
 
 

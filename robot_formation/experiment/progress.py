@@ -10,8 +10,7 @@ from functools import partial
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.control.motion import Motion
-from robot_formation.experiment.scenario import FORMATION_DISTANCE_M
+from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 
 _SAME_M = 1e-6
 

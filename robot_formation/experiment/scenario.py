@@ -12,13 +12,11 @@ import yaml
 
 from robot_formation import names
 from robot_formation.components.catalogue import KINDS
+from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.errors import FormationError
 from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES, make_surface
-
-FORMATION_DISTANCE_M = 0.32
-
 
 # Parameters that follow from the setup, and what to set instead.
 _FIXED = {
