@@ -194,7 +194,7 @@ def test_bad_wheel_commands_move_nothing_and_are_said(lab):
         conversions.joint_command(WheelCommand((1.0,) * 4, (1e6,) * 4), 0),
     ):
         commands.publish(bad)
-    lab.until(lambda: any(value.key == "warnings" and value.value == "3" for value in values_of(health, "world")))
+    lab.until(lambda: any(value.key == "warnings" and int(value.value) >= 3 for value in values_of(health, "world")))
     assert not any(position for message in joint_states for position in message.position)
     commands.publish(conversions.joint_command(good, 0))
     lab.until(lambda: any(joint_states[-1].position) and not any(joint_states[-1].velocity))
