@@ -105,12 +105,16 @@ def string(text: str) -> String:
 
 
 def joint_command(command: WheelCommand, stamp_ns: int) -> JointState:
-    """Relative wheel angles [rad] as `position`, speed limits [rad/s] as `velocity`."""
+    """Relative wheel angles [rad] as `position`, speed limits [rad/s] as `velocity`; `frame_id` numbers the command.
+
+    `effort` is not used, but filled: rosbags can't read what some CDR writers put behind an empty last list.
+    """
     return JointState(
-        header=header(stamp_ns),
+        header=header(stamp_ns, command.number),
         name=list(WHEELS),
         position=list(command.angles_rad),
         velocity=list(command.limits_rad_s),
+        effort=[0.0] * len(WHEELS),
     )
 
 
@@ -131,14 +135,20 @@ def read_joint_command(message: JointState) -> WheelCommand:
         raise MessageError("joint_commands must be finite")
     if max(map(abs, angles)) > _LARGEST_WHEEL_ANGLE_RAD:
         raise MessageError(f"joint_commands are relative angles in rad; {max(map(abs, angles)):.3g} is absurd")
-    return WheelCommand(angles, limits)
+    return WheelCommand(angles, limits, message.header.frame_id)
 
 
 def joint_states(
-    names: Sequence[str], positions: Sequence[float], velocities: Sequence[float], stamp_ns: int
+    names: Sequence[str], positions: Sequence[float], velocities: Sequence[float], stamp_ns: int, number: str = ""
 ) -> JointState:
-    """Make the joints' report: positions [rad], velocities [rad/s]."""
-    return JointState(header=header(stamp_ns), name=list(names), position=list(positions), velocity=list(velocities))
+    """Make the joints' report: positions [rad], velocities [rad/s]; `frame_id` is the number of the last command."""
+    return JointState(
+        header=header(stamp_ns, number),
+        name=list(names),
+        position=list(positions),
+        velocity=list(velocities),
+        effort=[0.0] * len(names),
+    )
 
 
 def read_joint_states(message: JointState) -> tuple[list[float], list[float]]:
@@ -207,11 +217,6 @@ def read_displacement(message: PoseWithCovarianceStamped) -> Motion:
 def has_estimate(message: PoseWithCovarianceStamped) -> bool:
     """Tell whether a displacement was estimated at all."""
     return float(message.pose.covariance[0]) >= 0.0
-
-
-def planar_pose(motion: Motion, frame: str, stamp_ns: int) -> PoseStamped:
-    """Make a planar pose in a frame."""
-    return move(motion, frame, stamp_ns)
 
 
 def odometry(motion: Motion, frame: str, child: str, stamp_ns: int) -> Odometry:

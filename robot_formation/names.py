@@ -6,6 +6,7 @@ to the formation as a whole lies under the namespace given by the parameter `for
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from robot_formation.errors import FormationError
@@ -18,6 +19,8 @@ BASE_FRAME = "base_link"
 ODOM_FRAME = "odom"
 OPTICAL_FRAME = "camera_optical_frame"
 OVERHEAD_FRAME = "overhead_camera_optical_frame"
+
+IMAGE_TYPE = "sensor_msgs/msg/Image"
 
 
 @dataclass(frozen=True)
@@ -40,15 +43,15 @@ STATUS = Qos(history="keep_last", depth=10)
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic: name (relative or absolute), message type, QoS and how many listeners a publisher must wait for.
+    """A topic: name (relative or absolute), message type, QoS, and the nodes that must hear its first message.
 
-    A message is held back until that many nodes have subscribed, so that the first ones are not lost to discovery.
+    That message is held back until nodes of these names have subscribed, so that it is not lost to discovery.
     """
 
     name: str
     type: str
     qos: Qos = EVENT
-    listeners: int = 0
+    listeners: tuple[str, ...] = ()
 
 
 def follower(number: int) -> str:
@@ -62,8 +65,8 @@ def beacon_neighbour(robot: str) -> str:
     Raises:
         FormationError: if the robot is no follower.
     """
-    prefix, _, number = robot.partition("_")
-    if prefix != "follower" or not number.isdigit() or int(number) < 1:
+    number = robot.removeprefix("follower_")
+    if not re.fullmatch("follower_[1-9][0-9]*", robot):
         raise FormationError(f"'{robot}' is no follower: followers are called follower_1, follower_2, ...")
     return LEADER if number == "1" else follower(int(number) - 1)
 
@@ -75,22 +78,22 @@ def under(prefix: str, name: str) -> str:
 
 def joint_commands(robot: str = "") -> Topic:
     """Relative wheel rotations for a robot (drive to world)."""
-    return Topic(under(robot, "joint_commands"), "sensor_msgs/msg/JointState", listeners=1)
+    return Topic(under(robot, "joint_commands"), "sensor_msgs/msg/JointState", listeners=("world",))
 
 
 def joint_states(robot: str = "") -> Topic:
     """Wheels and encoder wheels of a robot (world to drive)."""
-    return Topic(under(robot, "joint_states"), "sensor_msgs/msg/JointState", listeners=1)
+    return Topic(under(robot, "joint_states"), "sensor_msgs/msg/JointState", listeners=("drive",))
 
 
 def camera_request(robot: str = "") -> Topic:
     """Number of frames wanted (fine_tuner to world)."""
-    return Topic(under(robot, "camera/request"), "std_msgs/msg/UInt32", listeners=1)
+    return Topic(under(robot, "camera/request"), "std_msgs/msg/UInt32", listeners=("world",))
 
 
 def camera_image(robot: str = "") -> Topic:
     """A camera's picture (world to block_detector)."""
-    return Topic(under(robot, "camera/image_raw"), "sensor_msgs/msg/Image", listeners=1)
+    return Topic(under(robot, "camera/image_raw"), IMAGE_TYPE, listeners=("block_detector",))
 
 
 def camera_info(robot: str = "") -> Topic:
@@ -128,25 +131,25 @@ def overhead_path(robot: str) -> Topic:
     return Topic(f"overhead/{robot}/path", "nav_msgs/msg/Path", LATCHED)
 
 
-def formation_done(robot: str, formation: str = FORMATION, *, listeners: int = 1) -> Topic:
+def formation_done(robot: str, formation: str = FORMATION, *, listeners: tuple[str, ...] = ("fine_tuner",)) -> Topic:
     """The bare tick of a robot: the number of the timestep that it has finished."""
     return Topic(f"{formation}/{robot}/done", "std_msgs/msg/UInt32", HISTORY, listeners)
 
 
 SURFACE = Topic("surface", "visualization_msgs/msg/Marker", LATCHED)
-OVERHEAD_IMAGE = Topic("overhead/image_raw", "sensor_msgs/msg/Image", listeners=1)
+OVERHEAD_IMAGE = Topic("overhead/image_raw", IMAGE_TYPE, listeners=("overhead_tracker",))
 OVERHEAD_INFO = Topic("overhead/camera_info", "sensor_msgs/msg/CameraInfo", LATCHED)
 OVERHEAD_POSES = Topic("overhead/poses", "geometry_msgs/msg/PoseArray")
 CLOCK_TOPIC = Topic("/clock", "rosgraph_msgs/msg/Clock", CLOCK)
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", STATUS)
-MOVE = Topic("move", "geometry_msgs/msg/PoseStamped", listeners=1)
-MOVED = Topic("moved", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
+MOVE = Topic("move", "geometry_msgs/msg/PoseStamped", listeners=("drive",))
+MOVED = Topic("moved", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ())
 ODOM = Topic("odom", "nav_msgs/msg/Odometry")
-BLOCKS = Topic("blocks", "sensor_msgs/msg/PointCloud2", listeners=1)
-BLOCKS_IMAGE = Topic("blocks/image", "sensor_msgs/msg/Image")
-DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
-RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
-PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, listeners=1)
+BLOCKS = Topic("blocks", "sensor_msgs/msg/PointCloud2", listeners=("fine_tuner",))
+BLOCKS_IMAGE = Topic("blocks/image", IMAGE_TYPE)
+DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
+RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
+PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("fine_tuner",))
 ALIGNMENT = Topic("alignment", "std_msgs/msg/String", HISTORY)
 # Only in bags, where the recorder makes them of ground truth and robot descriptions: tf2_msgs is not on pip.
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import re
 import types
 import typing
 from collections.abc import Mapping
@@ -24,6 +25,8 @@ _ELEMENTS: dict[Any, type] = {
     tuple[int, ...]: int,
     tuple[str, ...]: str,
 }
+
+_EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
 
 
 class ParameterError(FormationError):
@@ -134,7 +137,10 @@ def check(spec: Spec, value: Any, *, where: str) -> Any:
     if spec.type in _ELEMENTS:
         if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
             raise ParameterError(f"{where}: '{spec.name}' must be a list, not {value!r}")
-        return tuple(_check_one(spec, _ELEMENTS[spec.type], item, where) for item in value)
+        items = tuple(_check_one(spec, _ELEMENTS[spec.type], item, where) for item in value)
+        if spec.default and not items:
+            raise ParameterError(f"{where}: '{spec.name}' must not be empty")
+        return items
     kind = spec.type
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
         raise TypeError(f"{spec.name}: optional parameters are not supported; use a neutral default")
@@ -143,6 +149,8 @@ def check(spec: Spec, value: Any, *, where: str) -> Any:
 
 def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
     wrong = ParameterError(f"{where}: '{spec.name}' must be of type {kind.__name__}, not {value!r}")
+    if kind is float and isinstance(value, str) and _EXPONENT.fullmatch(value):
+        value = float(value)  # YAML 1.1 takes 1e3, without a dot, for text
     if kind is float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise wrong

@@ -1,4 +1,4 @@
-"""Values become ROS messages and come back the same; bad messages are refused in one line before they reach anything."""
+"""Values become ROS messages and come back the same; bad ones are refused in one line before they reach a model."""
 
 import array
 import math
@@ -226,7 +226,7 @@ def test_yaw_is_read_from_a_tilted_pose_too(roll, pitch, yaw):
         return matrix
 
     rotation = about(2, yaw) @ about(1, pitch) @ about(0, roll)
-    # The quaternion of a rotation matrix, by its eigenvector of eigenvalue 1 in the four-dimensional form (Bar-Itzhack).
+    # The quaternion of a rotation matrix: the eigenvector of the largest eigenvalue of Bar-Itzhack's 4 x 4 form.
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
     form = np.array(
         [

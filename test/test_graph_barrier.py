@@ -81,7 +81,7 @@ def test_a_follower_hears_nothing_but_itself_and_its_neighbours_tick(tmp_path, m
 
 def test_the_witness_would_see_a_breach(tmp_path, monkeypatch):
     """The world listens outside any robot's namespace: what the barrier's test looks for can be seen."""
-    scenario = short_scenario("leader.timesteps=2")
+    scenario = short_scenario("leader.timesteps=8")
     witness = Witness(scenario.robots, monkeypatch)
     launch(scenario, tmp_path / "bag", on_start=witness.started)
     witness.finish()

@@ -10,7 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "robot_formation"
 
 LAYERS = [
-    {"", "errors", "names", "parameters", "paths"},
+    {"", "errors", "exit_codes", "names", "parameters", "paths"},
     {"surface"},
     {"world"},
     {"control", "koopman", "vision"},

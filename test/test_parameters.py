@@ -62,8 +62,8 @@ cars = st.builds(
     Car,
     count=st.integers(1, 8),
     fast=st.booleans(),
-    curve=st.lists(st.floats(-5.0, 5.0)).map(tuple),
-    gears=st.lists(st.integers(1)).map(tuple),
+    curve=st.lists(st.floats(-5.0, 5.0), min_size=1).map(tuple),
+    gears=st.lists(st.integers(1), min_size=1).map(tuple),
     riders=st.lists(st.text()).map(tuple),
     wheel=st.builds(Wheel, st.floats(0.01, 0.1), st.sampled_from(["mecanum", "omni"])),
 )
@@ -106,6 +106,7 @@ def test_flatten_joins_names_with_dots():
         ({"wheel": {"name": "omi"}}, "'wheel.name' can't be 'omi'; did you mean 'omni'?"),
         ({"wheel": 3}, "no parameter 'wheel'"),
         ({"curve": 1.0}, "'curve' must be a list, not 1.0"),
+        ({"curve": []}, "'curve' must not be empty"),
         ({"curve": "12"}, "'curve' must be a list, not '12'"),
         ({"curve": [1.0, "2"]}, "'curve' must be of type float, not '2'"),
         ({"curve": [1.0, 6.0]}, "'curve' is 6.0, outside -5.0 to 5.0"),
@@ -133,8 +134,9 @@ def test_the_ends_of_a_range_are_inside():
     assert build(count=8, wheel={"radius_m": 0.01}) == Car(count=8, wheel=Wheel(radius_m=0.01))
 
 
-def test_an_empty_list_is_a_value():
-    assert build(gears=[]).gears == ()
+def test_an_empty_list_is_refused_where_the_default_has_values():
+    with pytest.raises(ParameterError, match="'gears' must not be empty"):
+        build(gears=[])
 
 
 def test_parameter_objects_do_not_change():

@@ -257,5 +257,6 @@ def _outcome(record: RunRecord, followers: Sequence[FollowerAnalysis]) -> str:
         return "left_plate"
     planned = record.timesteps_planned
     if planned is None:
-        return "incomplete" if any(follower.unfinished is not None for follower in followers) else "done"
+        cut_short = any(follower.unfinished is not None or not follower.timesteps for follower in followers)
+        return "incomplete" if cut_short else "done"
     return "done" if all(len(follower.timesteps) >= planned for follower in followers) else "incomplete"

@@ -9,10 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.control.motion import Motion
-
-FORMATION_DISTANCE_M = 0.32
-"""Distance between base_link origins in formation, along u (paper, with the axes read as side by side)."""
+from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 
 DOT_HEIGHT_M = 0.216
 """Height of the reference dot above base_link (paper: the robot's height)."""

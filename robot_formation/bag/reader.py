@@ -147,11 +147,15 @@ def bag_name(path: str | Path) -> str:
 
 def _is_unclosed(path: Path) -> bool:
     """Tell whether a bag was never closed by its writer; check on the way that it is one."""
-    if path.is_dir():
-        return not (path / "metadata.yaml").exists() and bool(mcap_files(path))
-    if path.suffix == ".db3" and path.exists():
+    if path.exists() and (path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3")))):
         return False
-    (file,) = mcap_files(path)
+    if path.is_dir() and not (path / "metadata.yaml").exists():
+        return bool(mcap_files(path))
+    return any(_lacks_end(file) for file in mcap_files(path))
+
+
+def _lacks_end(file: Path) -> bool:
+    """Tell whether an MCAP file begins as one but doesn't end as one."""
     with file.open("rb") as stream:
         head = stream.read(len(_END_MAGIC))
         stream.seek(max(0, file.stat().st_size - len(_END_MAGIC)))
@@ -176,4 +180,4 @@ def _corrupted(path: Path, error: Exception) -> BagError:
     if isinstance(error, BagError):
         return error
     reason = " ".join(str(error).split()).rstrip(".") or type(error).__name__
-    return BagError(f"{path} can't be read: {reason}; if its end is missing, 'formation recover' saves the rest")
+    return BagError(f"{path} can't be read: {reason}; it may be damaged, or no bag")

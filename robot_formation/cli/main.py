@@ -11,12 +11,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import robot_formation
+from robot_formation import exit_codes
 from robot_formation.cli import analyze, calibrate, detect, doctor, list_, run, teach, test
 from robot_formation.errors import FormationError
 
 VERBS = (run, list_, analyze, calibrate, teach, detect, doctor, test)
-BAD_INPUT_EXIT_CODE = 2
-INTERRUPTED_EXIT_CODE = 130
 
 EPILOG = """\
 exit codes: 0 done, 2 usage or bad input, 3 leader lost or plate left, 4 a node died, 130 interrupted
@@ -41,22 +40,26 @@ def make_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a verb; return its exit code."""
     args = make_parser().parse_args(arguments)
-    signal.signal(signal.SIGTERM, _interrupt)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _interrupt)
     try:
         code: int = args.run(args)
         sys.stdout.flush()
         return code
     except FormationError as error:
         print(f"formation {args.verb}: {error}", file=sys.stderr)
-        return BAD_INPUT_EXIT_CODE
+        return exit_codes.BAD_INPUT
     except KeyboardInterrupt:
         print(f"formation {args.verb}: interrupted", file=sys.stderr)
-        return INTERRUPTED_EXIT_CODE
+        return exit_codes.INTERRUPTED
     except BrokenPipeError:
         # The reader of our output (head, less) has gone; Python would complain once more at exit.
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return exit_codes.DONE
+    except OSError as error:
+        print(f"formation {args.verb}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
+        return exit_codes.BAD_INPUT
 
 
 def _interrupt(number: int, frame: Any) -> None:

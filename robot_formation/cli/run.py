@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robot_formation import exit_codes
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -18,6 +20,10 @@ DESCRIPTION = """\
 Run a scenario through the node graph (one process per node), record it into a bag and analyse it. Without arguments:
 track two of the paper with the 'measured' predictor. Progress goes to standard error, the analysis to standard output.
 """
+
+
+MOST_WARNINGS = 20
+_TAILS = tuple(f"_{number}" for number in range(2, 1000))  # of bags begun in the same second
 
 
 def add_parser(subparsers: Any) -> None:
@@ -63,16 +69,24 @@ def run(args: argparse.Namespace) -> int:
     try:
         scenario = build_scenario(args)
         bag = args.bag.absolute() if args.bag is not None else default_bag(scenario)
-        check_free(bag)
         result = execute(args, scenario, bag)
     finally:
         tracing.remove_new()
-    for warning in result.warnings[:20]:
+    for warning in result.warnings[:MOST_WARNINGS]:
         print(f"warning: {warning}", file=sys.stderr)
+    if len(result.warnings) > MOST_WARNINGS:
+        print(f"... and {len(result.warnings) - MOST_WARNINGS} more warnings", file=sys.stderr)
     if result.reason:
         print(f"formation run: {result.reason}", file=sys.stderr)
-    if result.bag is not None:
+    if result.bag is None:
+        return result.exit_code
+    try:
         report(args, result)
+    except FormationError as error:
+        if result.exit_code in (exit_codes.DONE, exit_codes.LOST):
+            raise
+        # A run that was cut short may have ended before there was anything to analyse.
+        print(f"formation run: no analysis: {error}", file=sys.stderr)
     return result.exit_code
 
 
@@ -107,20 +121,8 @@ def default_bag(scenario: Scenario) -> Path:
 
     predictor = scenario.parameters("predictor")["name"]
     stem = f"{scenario.setup.name}_{predictor}_seed{scenario.setup.seed}_{time.strftime('%Y%m%d-%H%M%S')}"
-    return default_bags_dir() / stem
-
-
-def check_free(bag: Path) -> None:
-    """Refuse a path that is taken.
-
-    Raises:
-        FormationError: naming the path.
-    """
-    from robot_formation.bag.writer import PARTIAL_SUFFIX
-
-    for path in (bag, bag.with_name(bag.name + PARTIAL_SUFFIX)):
-        if path.exists():
-            raise FormationError(f"{path} exists already and is not overwritten; choose another path with --bag")
+    folder, stem = default_bags_dir(), re.sub(r"[^\w.-]", "_", stem)
+    return next(path for path in (folder / f"{stem}{tail}" for tail in ("", *_TAILS)) if not path.exists())
 
 
 def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResult:

@@ -105,6 +105,9 @@ class Component:
     def work(self) -> None:
         """Do the next piece of what is owed."""
 
+    def close(self) -> None:
+        """Give back what the component holds; called once, at the end."""
+
     def health(self) -> Health:
         """Report what /diagnostics shows; by default the last warning."""
         values = {"warnings": str(self._warnings), **self.details()}

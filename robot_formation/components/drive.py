@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from robot_formation import conversions, names
@@ -21,6 +22,8 @@ class DriveComponent(Component):
         super().__init__(place)
         self._drive = Drive(calibrated(parameters, place.robot))
         self._calibration = parameters.calibration_file or "by parameters"
+        listener = "leader" if place.robot == names.LEADER else "fine_tuner"
+        self._moved = replace(names.MOVED, listeners=(listener,))
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
@@ -28,7 +31,7 @@ class DriveComponent(Component):
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
-        return [names.joint_commands(), names.MOVED, names.ODOM]
+        return [names.joint_commands(), self._moved, names.ODOM]
 
     def services(self) -> dict[str, Callable[[], tuple[bool, str]]]:
         """See `Component`."""
@@ -49,7 +52,7 @@ class DriveComponent(Component):
             self.warn(str(error))
             return
         self.stamp_ns = conversions.stamp_of(message)
-        self._act(self._drive.joint_states(self.stamp_ns, positions, velocities))
+        self._act(self._drive.joint_states(self.stamp_ns, positions, velocities, message.header.frame_id))
 
     def _on_stop(self) -> tuple[bool, str]:
         action = self._drive.stop()
@@ -65,4 +68,4 @@ class DriveComponent(Component):
             base = self.place.frame(names.BASE_FRAME)
             odom = self.place.frame(names.ODOM_FRAME)
             self._send(names.ODOM, conversions.odometry(self._drive.odometry, odom, base, self.stamp_ns))
-            self._send(names.MOVED, conversions.displacement(action.moved, base, self.stamp_ns, _VARIANCE_M2))
+            self._send(self._moved, conversions.displacement(action.moved, base, self.stamp_ns, _VARIANCE_M2))

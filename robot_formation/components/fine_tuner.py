@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from robot_formation import conversions, names
+from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.control import fine_tuner as core
 from robot_formation.control.motion import Motion
 from robot_formation.parameters import parameter
-
-LOST_EXIT_CODE = 3
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class FineTunerNodeParameters(core.FineTunerParameters):
         1,
         "Nodes that wait for this follower's tick: the leader, and the follower behind if there is one",
         low=0,
-        high=10,
+        high=2,
     )
 
 
@@ -34,7 +32,8 @@ class FineTunerComponent(Component):
         super().__init__(place)
         self._tuner = core.FineTuner(parameters)
         self._neighbour = names.formation_done(names.beacon_neighbour(place.robot), place.formation)
-        self._done = names.formation_done(place.robot, place.formation, listeners=parameters.done_listeners)
+        listeners = ("leader", "fine_tuner")[: parameters.done_listeners]
+        self._done = names.formation_done(place.robot, place.formation, listeners=listeners)
         self._base = place.frame(names.BASE_FRAME)
 
     def inputs(self) -> list[Input]:
@@ -58,7 +57,8 @@ class FineTunerComponent(Component):
         self._act(self._tuner.neighbour_done(int(message.data)))
 
     def _on_prediction(self, message: Any) -> None:
-        self._act(self._tuner.prediction(conversions.read_displacement(message)))
+        known = conversions.has_estimate(message)
+        self._act(self._tuner.prediction(conversions.read_displacement(message) if known else None))
 
     def _on_moved(self, message: Any) -> None:
         self._act(self._tuner.moved(conversions.read_displacement(message), conversions.stamp_of(message)))
@@ -89,7 +89,7 @@ class FineTunerComponent(Component):
                     self.warn(text)
                 case core.Lost():
                     self.finish(
-                        LOST_EXIT_CODE,
+                        exit_codes.LOST,
                         f"{self.place.robot} lost its beacon neighbour in timestep {self._tuner.timestep}",
                     )
 

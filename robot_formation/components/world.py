@@ -83,6 +83,8 @@ class WorldComponent(Component):
         self._next = parameters
         self._paused = False
         self._cameras = [start.name for start in parameters.starts() if start.camera]
+        self._moving: set[str] = set()
+        self._numbers = dict.fromkeys(parameters.robots, "")  # of each robot's last command, echoed to its drive
         # Topics are made once: a run sends thousands of messages.
         self._joint_states = {name: names.joint_states(name) for name in parameters.robots}
         self._images = {name: names.camera_image(name) for name in self._cameras}
@@ -162,6 +164,10 @@ class WorldComponent(Component):
             self._publish(event)
         self._overhead.after(events, self._world, self._send)
 
+    def close(self) -> None:
+        """See `Component`."""
+        self._world.close()
+
     def details(self) -> dict[str, str]:
         """See `Component`."""
         return {
@@ -219,6 +225,12 @@ class WorldComponent(Component):
             self._world.command(robot, command.angles_rad, command.limits_rad_s)
         except ValueError as error:
             self.warn(f"{robot}: {error}; nothing moves")
+            if robot in self._moving:
+                return
+            # A hold: who waits for the motion's end gets one.
+            self._world.command(robot, (0.0,) * 4, (1.0,) * 4)
+        self._numbers[robot] = message.header.frame_id
+        self._moving.add(robot)
 
     def _on_request(self, robot: str, message: Any) -> None:
         try:
@@ -229,9 +241,13 @@ class WorldComponent(Component):
     def _publish(self, event: Event) -> None:
         match event:
             case JointStates():
-                if event.timed_out:
+                if event.final:
+                    self._moving.discard(event.robot)
+                if event.timed_out and event.final:
                     self.warn(f"{event.robot}: a motion took too long and was braked; is the robot blocked?")
-                message = conversions.joint_states(event.names, event.positions, event.velocities, event.stamp_ns)
+                message = conversions.joint_states(
+                    event.names, event.positions, event.velocities, event.stamp_ns, self._numbers[event.robot]
+                )
                 self._send(self._joint_states[event.robot], message)
             case Frame():
                 frame = f"{event.robot}/{names.OPTICAL_FRAME}"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robot_formation.control.motion import Motion
 from robot_formation.parameters import parameter
@@ -60,10 +60,14 @@ class DriveParameters:
 
 @dataclass(frozen=True)
 class WheelCommand:
-    """Relative rotations [rad] of the four drive wheels and their speed limits [rad/s]."""
+    """Relative rotations [rad] of the four drive wheels and their speed limits [rad/s].
+
+    The number is echoed in the joints' reports, so that the end of an earlier command isn't taken for that of a later.
+    """
 
     angles_rad: tuple[float, ...]
     limits_rad_s: tuple[float, ...]
+    number: str = ""
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,7 @@ class Drive:
         self._reference: tuple[float, ...] | None = None  # joint positions at the leg's start
         self._leg_start_ns: int | None = None
         self._stopping = False
+        self._number = 0
         self.odometry = Motion()
 
     @property
@@ -103,7 +108,7 @@ class Drive:
         self._busy = True
         self._stopping = False
         self._realised = Motion()
-        return DriveAction(command=self._next_leg(), warning=reason)
+        return DriveAction(command=self._numbered(self._next_leg()), warning=reason)
 
     def stop(self) -> DriveAction:
         """Brake now: the rest of the move is given up; `moved` reports what was driven."""
@@ -111,12 +116,15 @@ class Drive:
             return DriveAction(warning="nothing to stop: the robot stands")
         self._legs.clear()
         self._stopping = True
-        return DriveAction(command=self._hold(), warning="stopped on request")
+        return DriveAction(command=self._numbered(self._hold()), warning="stopped on request")
 
-    def joint_states(self, stamp_ns: int, positions: Sequence[float], velocities: Sequence[float]) -> DriveAction:
+    def joint_states(
+        self, stamp_ns: int, positions: Sequence[float], velocities: Sequence[float], number: str = ""
+    ) -> DriveAction:
         """Take the six joints' positions [rad] and velocities [rad/s]; all velocities zero means at rest.
 
-        Joints are ordered as `JOINTS`. Non-finite values must have been refused before.
+        Joints are ordered as `JOINTS`. Non-finite values must have been refused before. `number` is that of the command
+        that the report answers; a robot whose firmware doesn't tell leaves it empty.
         """
         if self._reference is None:
             # Joints count from zero at the start of the world, so the first report needs no earlier one.
@@ -126,10 +134,12 @@ class Drive:
             return DriveAction()
         if any(velocity != 0.0 for velocity in velocities):
             return self._check_timeout(stamp_ns)
+        if number not in ("", str(self._number)):
+            return DriveAction()  # the end of a motion that a later command has replaced
         self._realised = self._realised.then(self._displacement(self._reference, positions))
         self._reference = tuple(positions)
         if self._legs:
-            return DriveAction(command=self._next_leg())
+            return DriveAction(command=self._numbered(self._next_leg()))
         self._busy = False
         self.odometry = self.odometry.then(self._realised)
         return DriveAction(moved=self._realised)
@@ -142,9 +152,12 @@ class Drive:
             return DriveAction()
         self._legs.clear()
         self._stopping = True
-        return DriveAction(
-            command=self._hold(), warning=f"a leg took longer than {timeout_s} s: stopped; is the robot blocked?"
-        )
+        warning = f"a leg took longer than {timeout_s} s: stopped; is the robot blocked?"
+        return DriveAction(command=self._numbered(self._hold()), warning=warning)
+
+    def _numbered(self, command: WheelCommand) -> WheelCommand:
+        self._number += 1
+        return replace(command, number=str(self._number))
 
     def _refusal(self, target: Motion) -> str:
         p = self._parameters

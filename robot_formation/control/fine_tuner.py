@@ -37,11 +37,10 @@ class FineTunerParameters:
     first_step_m: float = parameter(
         0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
     )
-    max_v_m: float = parameter(
-        0.2, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=10.0
-    )
+    # The bodies are 8 cm apart in formation: a wild forecast must not push the neighbour.
+    max_v_m: float = parameter(0.1, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2)
     max_u_m: float = parameter(
-        0.1, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=10.0
+        0.05, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
     )
     look: LookParameters = LookParameters()
     alignment: AlignmentParameters = AlignmentParameters()
@@ -163,15 +162,15 @@ class FineTuner:
             return [RequestFrames(self._p.look.extra_frames)]
         return self._decide(self._alignment.assess(blocks), blocks)
 
-    def prediction(self, mean: Motion) -> list[Action]:
-        """The predictor's displacement for the next timestep, answered to this timestep's report."""
+    def prediction(self, mean: Motion | None) -> list[Action]:
+        """The predictor's displacement for the next timestep, answered to this report; None if it has none."""
         if self._phase is not Phase.PREDICTION:
             return [Warn("a prediction that nobody asked for is ignored")]
         actions: list[Action] = []
-        if mean.finite:
+        if mean is not None and mean.finite:
             self._prediction = mean
         else:
-            actions.append(Warn("a prediction that is not finite is ignored: the previous displacement is repeated"))
+            actions.append(Warn("no finite prediction: the previous displacement is repeated"))
             self._prediction = self._previous
         return [*actions, *self._finish()]
 
@@ -190,9 +189,7 @@ class FineTuner:
         collecting = self.timestep <= COLLECTION_TIMESTEPS
         actions: list[Action] = [State("collect" if collecting else "predict"), SendMove(motion)]
         if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
-            actions.insert(
-                0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is beyond the calibrated range: cut")
-            )
+            actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"))
         return actions
 
     def _planned(self) -> Motion:

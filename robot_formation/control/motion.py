@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+FORMATION_DISTANCE_M = 0.32
+"""Distance between base_link origins in formation, along u (paper, with the axes read as side by side)."""
+
 
 @dataclass(frozen=True)
 class Motion:

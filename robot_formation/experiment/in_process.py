@@ -6,6 +6,7 @@ bit.
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections import deque
 from collections.abc import Callable
@@ -14,18 +15,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from robot_formation import conversions
+from robot_formation import conversions, exit_codes
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.recorder import Recorder
+from robot_formation.bag.writer import PathReservation, check_free
 from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import NodeKind
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
-from robot_formation.names import Topic
+from robot_formation.names import IMAGE_TYPE, Topic
 from robot_formation.parameters import from_mapping
-
-IMAGE_TYPE = "sensor_msgs/msg/Image"
 
 
 @dataclass
@@ -66,6 +66,13 @@ class InProcessRun:
         Raises:
             RunError: if everybody waits for somebody, which no run should come to.
         """
+        try:
+            return self._run()
+        finally:
+            for hosted in self._hosted:
+                hosted.component.close()
+
+    def _run(self) -> tuple[int, str]:
         for hosted in self._hosted:
             hosted.component.start()
         world = self._hosted[0].component
@@ -76,8 +83,8 @@ class InProcessRun:
                 code, reason = max((component.exit_code or 0, component.exit_reason) for component in ended)
                 return code, reason if code else ""
             if not world.busy:
-                states = ", ".join(f"{h.namespace}: {dict(h.component.health().values)}" for h in self._hosted)
-                raise RunError(f"the run stands still: everybody waits ({states})")
+                last = f"; last warning: {self.warnings[-1]}" if self.warnings else ""
+                raise RunError(f"the run stands still: everybody waits for somebody{last}")
             world.work()
 
     def _host(self, kind: NodeKind, robot: str) -> _Hosted:
@@ -130,17 +137,22 @@ def run_in_process(
     """Run a scenario, record it if a path is given, and tell its progress to `say`.
 
     Raises:
-        BagError: if the bag's path is taken or can't be written.
-        RunError: if everybody waits for somebody.
+        FormationError: if a component refuses its parameters, or the bag's path is taken or can't be written.
     """
     began = time.monotonic()
     timesteps = scenario.parameters("leader")["timesteps"]
     progress = Progress(scenario.setup.followers, timesteps, say, lambda: time.monotonic() - began)
-    recorder = Recorder(bag, metadata) if bag is not None else None
-    try:
-        run = InProcessRun(scenario, recorder, images, progress.listen)
-        code, reason = run.run()
-    finally:
-        if recorder is not None:
-            recorder.close()
+    run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
+    with contextlib.ExitStack() as stack:
+        if bag is not None:
+            stack.enter_context(PathReservation(bag))
+            check_free(bag)
+            run.recorder = Recorder(bag, metadata)
+            stack.callback(run.recorder.close)
+        try:
+            code, reason = run.run()
+        except RunError as error:
+            code, reason = exit_codes.NODE_DIED, str(error)
+        except KeyboardInterrupt:
+            code, reason = exit_codes.INTERRUPTED, "interrupted"
     return RunResult(code, bag, reason, run.warnings, running_s=time.monotonic() - began)

@@ -10,8 +10,7 @@ from functools import partial
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.control.motion import Motion
-from robot_formation.experiment.scenario import FORMATION_DISTANCE_M
+from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 
 _SAME_M = 1e-6
 
@@ -24,6 +23,7 @@ class _Heard:
     moves: list[tuple[int, Motion]] = field(default_factory=list)
     timesteps: deque[tuple[int, Motion]] = field(default_factory=deque)
     told: int = 0
+    begun: int = 0
     told_until_ns: int = -1
 
     def pose_between(self, after_ns: int, until_ns: int) -> Motion | None:
@@ -77,8 +77,10 @@ class Progress:
         self._heard[robot].timesteps.append((conversions.stamp_of(message), conversions.read_displacement(message)))
 
     def _alignment(self, robot: str, message: Any) -> None:
-        if message.data == "lost":
-            self._say(f"{robot}: lost its beacon neighbour in timestep {self._heard[robot].told + 1}")
+        if message.data in ("collect", "predict"):
+            self._heard[robot].begun += 1
+        elif message.data == "lost":
+            self._say(f"{robot}: lost its beacon neighbour in timestep {self._heard[robot].begun}")
 
     def _tell(self) -> None:
         for robot, heard in self._heard.items():

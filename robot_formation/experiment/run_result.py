@@ -7,11 +7,6 @@ from pathlib import Path
 
 from robot_formation.errors import FormationError
 
-DONE_EXIT_CODE = 0
-LOST_EXIT_CODE = 3
-NODE_DIED_EXIT_CODE = 4
-INTERRUPTED_EXIT_CODE = 130
-
 
 class RunError(FormationError):
     """A run can't go on."""

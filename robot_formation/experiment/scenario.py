@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,25 @@ import yaml
 
 from robot_formation import names
 from robot_formation.components.catalogue import KINDS, NodeKind
+from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.errors import FormationError
 from robot_formation.experiment.drive_curves import check_curves
 from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
 
-FORMATION_DISTANCE_M = 0.32
+# Parameters that follow from the setup, and what to set instead.
+_FIXED = {
+    "world": {
+        "seed": "'seed'",
+        "robots": "'followers'",
+        "start_x_m": "'start_x_m' of the scenario",
+        "start_y_m": "'start_y_m' of the scenario",
+        "start_heading_rad": "'heading_deg' of the scenario",
+    },
+    "leader": {"followers": "'followers'"},
+    "fine_tuner": {"done_listeners": "'followers'"},
+}
 
 
 class ScenarioError(FormationError):
@@ -91,7 +103,13 @@ class Scenario:
         """
         for kind in KINDS:
             self.parameters(kind)
-        from_mapping(KINDS["world"].parameter_class(), self.parameters("world"), where="world").check()
+        world, drive = self.parameters("world"), self.parameters("drive")
+        if drive["wheel_speed_rad_s"] > world["motor.max_speed_rad_s"]:
+            raise ParameterError(
+                f"drive: 'wheel_speed_rad_s' is {drive['wheel_speed_rad_s']}, more than the world's "
+                f"'motor.max_speed_rad_s' of {world['motor.max_speed_rad_s']}: every move would be refused"
+            )
+        from_mapping(KINDS["world"].parameter_class(), world, where="world").check()
         check_curves(self)
 
     def _world(self) -> dict[str, Any]:
@@ -148,7 +166,8 @@ def load(path: Path) -> Scenario:
     setup = from_mapping(Setup, {"name": path.stem, **top}, where=str(path))
     sections = {}
     for kind in KINDS:
-        section = content.get(kind) or {}
+        section = content.get(kind, {})
+        section = {} if section is None else section  # an entry with nothing below it
         if not isinstance(section, Mapping):
             raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {section!r}")
         sections[kind] = _checked(kind, flatten(section), where=f"{path}: {kind}")
@@ -156,6 +175,9 @@ def load(path: Path) -> Scenario:
 
 
 def _checked(kind: str, section: Mapping[str, Any], *, where: str) -> dict[str, Any]:
+    for name in section:
+        if name in _FIXED.get(kind, {}):
+            raise ParameterError(f"{where}: '{name}' follows from the scenario; set {_FIXED[kind][name]} instead")
     checked = to_mapping(from_mapping(KINDS[kind].parameter_class(), {**node_defaults(kind), **section}, where=where))
     return {name: checked[name] for name in section}
 
@@ -167,6 +189,7 @@ def override(scenario: Scenario, settings: Sequence[str]) -> Scenario:
         ScenarioError: if a setting has no '=' or names no node.
         ParameterError: on an unknown parameter or a wrong value.
     """
+    values: list[tuple[str, Any]] = []
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not equals:
@@ -175,24 +198,31 @@ def override(scenario: Scenario, settings: Sequence[str]) -> Scenario:
             value = yaml.safe_load(text)
         except yaml.YAMLError:
             raise ScenarioError(f"--set {key}: '{text}' is no YAML value") from None
-        scenario = with_value(scenario, key, value)
-    return scenario
+        values.append((key, value))
+    return with_values(scenario, values)
 
 
 def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
-    """Set one value: 'seed' or 'NODE.PARAMETER'."""
-    kind, dot, name = key.partition(".")
-    if not dot:
-        if key not in specs(Setup):
-            raise ParameterError(
-                f"--set: no entry '{key}'{suggestion(key, [*specs(Setup), *(f'{k}.' for k in KINDS)])}"
-            )
-        values = {**to_mapping(scenario.setup), key: value}
-        return replace(scenario, setup=from_mapping(Setup, values, where="--set"))
-    if kind not in KINDS:
-        raise ParameterError(f"--set: no node '{kind}'{suggestion(kind, KINDS)}")
-    section = {**scenario.sections.get(kind, {}), **_checked(kind, {name: value}, where=f"--set: {kind}")}
-    return replace(scenario, sections={**scenario.sections, kind: section})
+    """Set one value: 'seed' or 'NODE.PARAMETER'. Errors as for `override`."""
+    return with_values(scenario, [(key, value)])
+
+
+def with_values(scenario: Scenario, values: Sequence[tuple[str, Any]]) -> Scenario:
+    """Set values together, so that only their sum has to make sense. Errors as for `override`."""
+    setup = to_mapping(scenario.setup)
+    sections = {kind: dict(section) for kind, section in scenario.sections.items()}
+    for key, value in values:
+        kind, dot, name = key.partition(".")
+        if dot and kind not in KINDS:
+            raise ParameterError(f"--set: no node '{kind}'{suggestion(kind, KINDS)}")
+        if not dot and key not in setup:
+            raise ParameterError(f"--set: no entry '{key}'{suggestion(key, [*setup, *(f'{k}.' for k in KINDS)])}")
+        if dot:
+            sections.setdefault(kind, {}).update(flatten({name: value}))
+        else:
+            setup[key] = value
+    checked = {kind: _checked(kind, section, where=f"--set: {kind}") for kind, section in sections.items()}
+    return Scenario(from_mapping(Setup, setup, where="--set"), checked)
 
 
 def with_surface(scenario: Scenario, surface: str) -> Scenario:
@@ -234,7 +264,8 @@ def read_yaml(path: Path) -> Any:
         return yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise ScenarioError(f"{path}: can't read it: {getattr(error, 'strerror', None) or error}") from None
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f" in line {mark.line + 1}" if mark else ""
-        raise ScenarioError(f"{path}: no valid YAML{where}: {getattr(error, 'problem', None) or error}") from None
+        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        raise ScenarioError(f"{path}: no valid YAML{where}: {problem}") from None

@@ -6,6 +6,9 @@ import os
 import sys
 from pathlib import Path
 
+FOREIGN = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")
+"""Variables that would let a run's nodes talk beyond this machine, or not find each other."""
+
 
 def node_environment(domain: int, log_folder: Path) -> dict[str, str]:
     """Make a process's environment: its own ROS domain on this machine only, and logs that are ours to remove.
@@ -20,8 +23,10 @@ def node_environment(domain: int, log_folder: Path) -> dict[str, str]:
         ROS_LOG_DIR=str(log_folder),
         RCUTILS_LOGGING_USE_STDOUT="0",
         PYTHONUNBUFFERED="1",
+        PYTHONSAFEPATH="1",  # a file of the user's folder must not stand in for a library's
     )
-    environment.pop("ROS_STATIC_PEERS", None)
+    for name in FOREIGN:
+        environment.pop(name, None)
     environment.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     # Many small processes on few cores: a pool of threads for linear algebra in each would only get in the way.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):

@@ -12,19 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from robot_formation import exit_codes
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.recover import recover
-from robot_formation.bag.writer import PARTIAL_SUFFIX
+from robot_formation.bag.writer import CUT_OFF_SUFFIX, PARTIAL_SUFFIX, PathReservation, check_free
 from robot_formation.experiment.domain import DomainReservation
 from robot_formation.experiment.progress import Progress
-from robot_formation.experiment.run_result import (
-    DONE_EXIT_CODE,
-    INTERRUPTED_EXIT_CODE,
-    LOST_EXIT_CODE,
-    NODE_DIED_EXIT_CODE,
-    RunError,
-    RunResult,
-)
+from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.experiment.shared_memory import clean_orphans
 from robot_formation.launching.child import Child
@@ -32,8 +26,7 @@ from robot_formation.launching.environment import node_environment
 from robot_formation.launching.processes import RECORDER, processes
 
 _POLL_S = 0.05
-CUT_OFF_SUFFIX = ".cut_off"
-_BAD_INPUT_EXIT_CODE = 2
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
 _RECORDER_STOP_SIGNALS = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 1.0))
@@ -48,7 +41,7 @@ class Launcher:
         bag: where the recorder writes; None records nothing.
         images: whether pictures are recorded too.
         say: takes the lines of progress.
-        silence_s: wall seconds without any sign of life after which the run is given up.
+        silence_s: wall seconds without any sign of life after which the run is given up; longer in slow motion.
         callback_delay_s: longest random delay before each callback of every node (tests).
         on_start: called once all processes run, with the ROS domain and the process ids by node name (tests).
     """
@@ -67,15 +60,19 @@ class Launcher:
         """Run to the end; whatever happens, no process, file or shared memory is left but the bag.
 
         Raises:
-            RunError: if the bag's path is taken or a node refuses its parameters.
+            BagError: if the bag's path is taken.
+            RunError: if a node refuses its parameters.
         """
-        self._check_bag()
         with contextlib.ExitStack() as stack:
+            if self.bag is not None:
+                stack.enter_context(PathReservation(self.bag))
+                check_free(self.bag)
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="robot_formation_")))
             domain = stack.enter_context(DomainReservation())
             stack.enter_context(self._signals())
-            stack.callback(clean_orphans, domain)
-            result = RunResult(NODE_DIED_EXIT_CODE, self.bag)
+            # Those of every domain: also what a run left whose launcher was killed itself.
+            stack.callback(clean_orphans)
+            result = RunResult(exit_codes.NODE_DIED, self.bag)
             began = time.monotonic()
             try:
                 environment = node_environment(domain, folder)
@@ -89,13 +86,6 @@ class Launcher:
                 result.warnings = [text for child in self._children for text in child.warnings()]
                 self._rescue_bag(result)
         return result
-
-    def _check_bag(self) -> None:
-        if self.bag is None:
-            return
-        for path in (self.bag, self.bag.with_name(self.bag.name + PARTIAL_SUFFIX)):
-            if path.exists():
-                raise RunError(f"{path} exists already and is not overwritten; choose another path with --bag")
 
     def _start(self, folder: Path, environment: dict[str, str]) -> None:
         for process in processes(self.scenario, self.bag, images=self.images):
@@ -112,6 +102,8 @@ class Launcher:
 
         began = time.monotonic()
         setup, timesteps = self.scenario.setup, self.scenario.parameters("leader")["timesteps"]
+        factor = self.scenario.parameters("world")["real_time_factor"]
+        silence_s = self.silence_s / (min(factor, 1.0) or 1.0)
         progress = Progress(setup.followers, timesteps, self.say, lambda: time.monotonic() - began)
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:
@@ -124,23 +116,23 @@ class Launcher:
                     last, heard = now, monitor.messages
                     result.startup_s = result.startup_s or now - began
                 if self._interrupted:
-                    return INTERRUPTED_EXIT_CODE, "interrupted"
+                    return exit_codes.INTERRUPTED, "interrupted"
                 ended = next((child for child in self._children if child.poll() is not None), None)
                 if ended is not None:
                     monitor.spin(_POLL_S)
                     return self._verdict(ended)
-                if now - last > self.silence_s:
-                    return NODE_DIED_EXIT_CODE, f"no node has shown a sign of life for {self.silence_s:.0f} s"
+                if now - last > silence_s:
+                    return exit_codes.NODE_DIED, f"no node has shown a sign of life for {silence_s:.0f} s"
 
     def _verdict(self, ended: Child) -> tuple[int, str]:
         code, executable = ended.exit_code, ended.process.executable
         if code == 0 and executable == "leader":
-            return DONE_EXIT_CODE, ""
-        if code == LOST_EXIT_CODE and executable in ("fine_tuner", "world"):
-            return LOST_EXIT_CODE, ended.last_words()
-        if code == _BAD_INPUT_EXIT_CODE:
-            raise RunError(ended.last_words())
-        return NODE_DIED_EXIT_CODE, f"node {ended.name} {ended.death}"
+            return exit_codes.DONE, ""
+        if code == exit_codes.LOST and executable in ("fine_tuner", "world"):
+            return exit_codes.LOST, ended.last_words()
+        if code == exit_codes.BAD_INPUT:
+            raise RunError(f"{ended.name}: {ended.last_words()}")
+        return exit_codes.NODE_DIED, f"node {ended.name} {ended.death}"
 
     def _stop(self) -> None:
         """End all nodes, the recorder last, so that it gets everything that the others still send."""
@@ -153,12 +145,20 @@ class Launcher:
             end = time.monotonic() + patience_s
             for child in children:
                 child.signal(number)
+            interrupts = self._interrupted
             while any(child.poll() is None for child in children) and time.monotonic() < end:
                 time.sleep(0.01)
+                if self._interrupted > max(interrupts, 1):
+                    break  # asked again: no more patience with this signal
 
     def _rescue_bag(self, result: RunResult) -> None:
         """Finish a bag that its recorder could not finish."""
         if self.bag is None or self.bag.exists():
+            return
+        if any(
+            child.exit_code == exit_codes.BAD_INPUT for child in self._children if child.process.executable == RECORDER
+        ):
+            result.bag = None  # it never opened a bag: what lies there is somebody else's
             return
         partial = self.bag.with_name(self.bag.name + PARTIAL_SUFFIX)
         if not partial.exists():
@@ -177,15 +177,12 @@ class Launcher:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Turn SIGINT and SIGTERM into a flag; the second one stops waiting for nodes in good order."""
+        """Count SIGINT, SIGTERM and SIGHUP; each after the first shortens the wait for nodes to end in good order."""
 
         def handler(number: int, frame: Any) -> None:
             self._interrupted += 1
-            if self._interrupted > 1:
-                for child in self._children:
-                    child.signal(signal.SIGKILL)
 
-        before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGTERM)}
+        before = {number: signal.signal(number, handler) for number in _SIGNALS}
         try:
             yield
         finally:

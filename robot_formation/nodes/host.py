@@ -11,9 +11,10 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
@@ -22,12 +23,12 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool, Trigger
 
-from robot_formation import conversions, names
+from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.nodes.executor import make_executor
-from robot_formation.nodes.outbox import IMAGE_TYPE, Outbox
+from robot_formation.nodes.outbox import Outbox
 from robot_formation.nodes.parameters import HostParameters, declare, take_changes
 
 _IDLE_S = 0.1  # how often an idle node looks for signals
@@ -49,28 +50,39 @@ def qos_profile(qos: names.Qos) -> QoSProfile:
 
 def main_of(kind: str) -> int:
     """Run the node of this kind until it ends; return its exit code (0 done, 2 bad parameter, or the component's)."""
-    return run_node(kind, lambda node: Host(node, kind).run())
+    return run_node(kind, lambda node: Host(node, kind))
 
 
-def run_node(name: str, body: Callable[[Node], int]) -> int:
-    """Make a node, run `body` with it and clean up; errors from outside become one line and exit code 2."""
+class Runnable(Protocol):
+    """What runs on a node until it ends."""
+
+    def run(self) -> int:
+        """Run; return the exit code."""
+
+
+def run_node(name: str, make: Callable[[Node], Runnable]) -> int:
+    """Make a node and what runs on it, run and clean up; errors from outside become one line.
+
+    Returns:
+        The exit code: 2 if what was given at the start is bad, 1 for such an error later, else that of the run.
+    """
     # ROS's own handlers invalidate the context at once, which would lose what is still to be sent.
     stop_on_signals()
-    node = None
+    node, running = None, False
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = Node(name, allow_undeclared_parameters=False)
-        return body(node)
+        body = make(node)
+        running = True
+        return body.run()
     except _BAD_INPUT as error:
         print(f"{name}: {error}", file=sys.stderr)
-        return 2
-    except rclpy.exceptions.ROSInterruptException:
-        return 0
+        return exit_codes.ERROR if running else exit_codes.BAD_INPUT
     except Exception as error:
         if type(error).__name__ not in ("RCLError", "RCLInvalidROSArgsError", "UnknownROSArgsError"):
             raise
         print(f"{name}: {str(error).splitlines()[0]}", file=sys.stderr)
-        return 2
+        return exit_codes.BAD_INPUT
     finally:
         if node is not None:
             node.destroy_node()
@@ -146,7 +158,8 @@ class Host:
         self._health = node.create_publisher(
             conversions.message_class(health.type), health.name, qos_profile(health.qos)
         )
-        node.create_timer(_DIAGNOSTICS_S, self._publish_health)
+        # Wall time: with use_sim_time a node's own clock stands while nobody moves.
+        node.create_timer(_DIAGNOSTICS_S, self._publish_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def run(self) -> int:
         """Spin until the component finishes or a signal comes; then make sure that everything sent has arrived."""
@@ -171,6 +184,7 @@ class Host:
             for publisher in self._publishers.values():
                 publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
             executor.shutdown()
+            component.close()
         return component.exit_code or 0
 
     def _delayed(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
@@ -200,7 +214,7 @@ class Host:
 
     def _publish_health(self) -> None:
         for topic, publisher in self._publishers.items():
-            if topic.listeners == 0 and topic.type == IMAGE_TYPE:
+            if not topic.listeners and topic.type == names.IMAGE_TYPE:
                 self._component.listened_to(topic, publisher.get_subscription_count())
         health = self._component.health()
         name = self._node.get_fully_qualified_name()

@@ -21,22 +21,26 @@ from robot_formation.nodes.host import qos_profile
 # Nodes whose names begin with an underscore are hidden: nobody waits for them, and lists leave them out.
 _NAME = "_monitor"
 # What a process must have in common with the run's nodes to find them at once, and where rclpy writes its log.
-_JOINING = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOG_DIR")
+_JOINING = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOG_DIR")
 
 
 @contextlib.contextmanager
-def _variables(values: Mapping[str, str]) -> Iterator[None]:
-    """Set environment variables for a while: rclpy reads its settings from nowhere else."""
+def _variables(values: Mapping[str, str | None]) -> Iterator[None]:
+    """Set or (None) unset environment variables for a while: rclpy reads its settings from nowhere else."""
     before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
+    _set(values)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+        _set(before)
+
+
+def _set(values: Mapping[str, str | None]) -> None:
+    for name, value in values.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
 
 
 class Monitor:
@@ -51,7 +55,7 @@ class Monitor:
             listen: called with topic and message.
         """
         self._context = Context()
-        with _variables({name: environment[name] for name in _JOINING}):
+        with _variables({name: environment.get(name) for name in _JOINING}):
             domain = int(environment["ROS_DOMAIN_ID"])
             rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
         self._node = Node(_NAME, context=self._context, start_parameter_services=False, enable_rosout=False)

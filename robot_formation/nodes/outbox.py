@@ -10,16 +10,17 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from robot_formation.names import Topic
+from robot_formation.names import IMAGE_TYPE, Topic
 
-IMAGE_TYPE = "sensor_msgs/msg/Image"
+_STAND_IN_S = 5.0
 
 
 class Outbox:
     """Publishes in order; a topic's first message waits, at most for a while, until all its listeners have matched.
 
     A reliable publisher that has matched a subscription delivers everything that it publishes from then on, so nothing
-    needs to be known of the other side. Hidden nodes (names that begin with an underscore) don't count as listeners.
+    needs to be known of the other side. Where a listener doesn't come but another node has subscribed in its place,
+    that one counts after a while; hidden nodes (names that begin with an underscore) never do.
     """
 
     def __init__(
@@ -45,7 +46,7 @@ class Outbox:
         """Make a topic known."""
         self._publishers[topic] = publisher
         recorded = self._recorder and (self._record_images or topic.type != IMAGE_TYPE)
-        if topic.listeners == 0 and not recorded:
+        if not topic.listeners and not recorded:
             self._ready.add(topic)
 
     @property
@@ -65,7 +66,8 @@ class Outbox:
             if topic not in self._ready and not self._matched(topic):
                 if self._since is None:
                     self._since = time.monotonic()
-                if time.monotonic() - self._since < self._patience_s:
+                waited_s = time.monotonic() - self._since
+                if waited_s < self._patience_s and not (waited_s > _STAND_IN_S and self._stood_in(topic)):
                     return
                 self._warn(f"nobody listens to {self._publishers[topic].topic_name}: going on")
             self._since = None
@@ -74,10 +76,17 @@ class Outbox:
             self._waiting.popleft()
 
     def _matched(self, topic: Topic) -> bool:
+        """Tell whether all listeners, the recorder and whoever else has subscribed have matched."""
         publisher = self._publishers[topic]
         found = self._node.get_subscriptions_info_by_topic(publisher.topic_name)
-        nodes = {(info.node_namespace, info.node_name) for info in found if not info.node_name.startswith("_")}
-        recorders = {node for node in nodes if node[1] == self._recorder}
-        if self._recorder and not recorders and (self._record_images or topic.type != IMAGE_TYPE):
-            return False
-        return len(nodes - recorders) >= topic.listeners and publisher.get_subscription_count() >= len(found)
+        names = {info.node_name for info in found}
+        expected = set(topic.listeners)
+        if self._recorder and (self._record_images or topic.type != IMAGE_TYPE):
+            expected.add(self._recorder)
+        return expected <= names and publisher.get_subscription_count() >= len(found)
+
+    def _stood_in(self, topic: Topic) -> bool:
+        """Tell whether nodes of other names listen in place of those expected: a user's own predictor, say."""
+        found = self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name)
+        names = {info.node_name for info in found if not info.node_name.startswith("_")} - {self._recorder}
+        return len(names) >= max(len(topic.listeners), 1)

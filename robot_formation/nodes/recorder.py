@@ -10,25 +10,26 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from robot_formation import conversions
+from robot_formation import conversions, exit_codes, names
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.recorder import Recorder
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import run_node, stopped
-from robot_formation.nodes.outbox import IMAGE_TYPE
 from robot_formation.nodes.parameters import HostParameters, declare
 from robot_formation.parameters import ParameterError, parameter
 
 _DISCOVERY_S = 0.05
 _TICK_TYPE = "std_msgs/msg/UInt32"
 _AFTER_TICK_S = 0.05  # what belongs to a timestep arrives well within this after its tick
-_SILENCE_S = 0.1  # no message for so long after the signal to end: everything sent has arrived
+_ROUND_S = 0.03
+_QUIET_ROUNDS = 4  # without a message after the signal to end: everything sent has arrived
 _LONGEST_DRAIN_S = 5.0
 
 
@@ -67,7 +68,7 @@ class RecorderNode:
         """Record until a signal comes; then take what is still on its way and close the bag."""
         executor = make_executor()
         executor.add_node(self._node)
-        timer = self._node.create_timer(_DISCOVERY_S, self._discover)
+        timer = self._node.create_timer(_DISCOVERY_S, self._discover, clock=Clock(clock_type=ClockType.STEADY_TIME))
         try:
             while not stopped():
                 before = self._messages
@@ -75,14 +76,15 @@ class RecorderNode:
                 self._end_chunk(idle=self._messages == before)
             timer.cancel()
             self._drain(executor)
+            path = self._recorder.close()
         except BagError as error:
+            # What was written before stays in the .partial folder.
             print(f"recorder: {error}", file=sys.stderr)
-            return 1
+            return exit_codes.ERROR
         finally:
             executor.shutdown()
-            path = self._recorder.close()
         self._node.get_logger().info(f"{self._recorder.message_count} messages in {path}")
-        return 0
+        return exit_codes.DONE
 
     def _end_chunk(self, *, idle: bool) -> None:
         """Close a chunk soon after every tick, and whenever nothing arrives."""
@@ -93,12 +95,12 @@ class RecorderNode:
 
     def _drain(self, executor: Executor) -> None:
         end = time.monotonic() + _LONGEST_DRAIN_S
-        last = time.monotonic()
-        while time.monotonic() < min(end, last + _SILENCE_S):
+        quiet = 0
+        # Rounds are counted, not time: on a busy machine this process may not run for longer than any silence.
+        while quiet < _QUIET_ROUNDS and time.monotonic() < end:
             before = self._messages
-            executor.spin_once(_SILENCE_S / 4)
-            if self._messages != before:
-                last = time.monotonic()
+            executor.spin_once(_ROUND_S)
+            quiet = 0 if self._messages != before else quiet + 1
 
     def _discover(self) -> None:
         for name, types in self._node.get_topic_names_and_types():
@@ -107,7 +109,7 @@ class RecorderNode:
             infos = self._node.get_publishers_info_by_topic(name)
             if not infos:
                 continue
-            if self._exclude.fullmatch(name) or (types[0] == IMAGE_TYPE and not self._parameters.images):
+            if self._exclude.fullmatch(name) or (types[0] == names.IMAGE_TYPE and not self._parameters.images):
                 self._ignored.add(name)
                 continue
             self._subscribe(name, types[0], infos)
@@ -149,7 +151,7 @@ def _offered(profile: QoSProfile) -> TopicQos:
 
 def main() -> int:
     """Run the node until it ends."""
-    return run_node("recorder", lambda node: RecorderNode(node).run())
+    return run_node("recorder", RecorderNode)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,8 @@ from robot_formation.world.parameters import MotorParameters
 HELD = 0
 DRIVING = 1
 BRAKING = 2
+_HOLD_SPEED_RAD_S = 0.3
+"""Static friction of the gear stops a shorted motor below this speed; what it would still turn is 0.05 mm of travel."""
 
 _CHANGING = (
     "angle",
@@ -186,8 +188,8 @@ class Wheel:
             speed = free + friction
         else:
             speed = 0.0
-        if self.state == BRAKING and speed * self.speed <= 0.0:
-            # The gear can't be driven back: once the wheel stands, it stays.
+        if self.state == BRAKING and (speed * self.speed <= 0.0 or abs(speed) < _HOLD_SPEED_RAD_S):
+            # The gear can't be driven back: once the wheel stands, or all but stands, it stays.
             speed = 0.0
             self.state = HELD
         self.speed = speed

@@ -1,0 +1,315 @@
+"""Scenarios: presets that load, files that agree with the code, overrides, and one line for everything wrong."""
+
+import math
+import re
+
+import pytest
+import yaml
+
+from robot_formation.components.catalogue import KINDS
+from robot_formation.control.motion import FORMATION_DISTANCE_M
+from robot_formation.errors import FormationError
+from robot_formation.experiment import scenario as module
+from robot_formation.experiment.scenario import (
+    Setup,
+    load,
+    load_track,
+    node_defaults,
+    override,
+    presets,
+    track_names,
+    with_surface,
+)
+from robot_formation.koopman.predictors import MODELS, PredictorParameters
+from robot_formation.parameters import from_mapping, specs, to_mapping
+from robot_formation.surface import SURFACES
+
+# What a scenario's setup fixes, so that config/ need not (and must not) say it.
+FIXED = {
+    "world": {"seed", "robots", "start_x_m", "start_y_m", "start_heading_rad"},
+    "leader": {"followers"},
+    "fine_tuner": {"done_listeners"},
+}
+
+
+@pytest.fixture
+def track_two():
+    return load_track("two")
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(text):
+        path = tmp_path / "mine.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return to_file
+
+
+def one_line(action, *arguments):
+    """The text of the error that an action ends with; one line of the project's own errors."""
+    with pytest.raises(FormationError) as caught:
+        action(*arguments)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+# --- what is shipped --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", sorted(presets()))
+def test_every_preset_loads_and_checks_and_is_called_like_its_file(name):
+    found = load(presets()[name])
+    found.check()
+    assert found.setup.name == name
+
+
+def test_tracks_are_the_presets_that_are_called_so():
+    assert set(track_names()) == {"one", "two", "one_baseline", "two_baseline"}
+
+
+@pytest.mark.parametrize(
+    ("track", "x_m", "y_m", "heading_deg", "timesteps"),
+    [
+        ("one", 0.763, 0.158, 90.0, 15),
+        ("two", 1.412, 0.111, 135.0, 20),
+        ("one_baseline", 0.769, 0.173, 90.0, 15),
+        ("two_baseline", 1.397, 0.163, 135.0, 20),
+    ],
+)
+def test_tracks_start_where_the_papers_do(track, x_m, y_m, heading_deg, timesteps):
+    found = load_track(track)
+    setup = found.setup
+    assert (setup.start_x_m, setup.start_y_m, setup.heading_deg) == (x_m, y_m, heading_deg)
+    leader = found.parameters("leader")
+    assert (leader["timesteps"], leader["step_m"]) == (timesteps, 0.05)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_config_files_hold_exactly_the_parameters_that_the_setup_does_not_fix(kind):
+    known = set(specs(KINDS[kind].parameter_class())) - FIXED.get(kind, set())
+    given = set(node_defaults(kind))
+    assert given - known == set(), "unknown keys"
+    assert known - given == set(), "missing keys"
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_config_files_are_ros_parameter_files_for_any_node_name(kind):
+    path = module.config_dir() / f"{kind}.yaml"
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert list(content) == ["/**"]
+    assert list(content["/**"]) == ["ros__parameters"]
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_config_files_hold_valid_values(kind):
+    from_mapping(KINDS[kind].parameter_class(), node_defaults(kind), where=kind)
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"block_detector"}))
+def test_config_files_repeat_the_defaults_of_the_code(kind):
+    values = to_mapping(KINDS[kind].parameter_class()())
+    assert {
+        name: pytest.approx(values[name]) if specs(KINDS[kind].parameter_class())[name].type is float else values[name]
+        for name in node_defaults(kind)
+    } == node_defaults(kind)
+
+
+def test_the_detector_is_tuned_as_in_the_paper():
+    found = node_defaults("block_detector")
+    assert found["signature_range"] == [5.0, 6.0, 6.0]
+    assert (found["block_filtering"], found["max_merge_dist"], found["min_block_area"]) == (40, 4, 20)
+    assert found["signature_teach_threshold"] == 5600
+
+
+def test_the_same_length_has_the_same_value_in_every_node(track_two):
+    world, drive, tuner, predictor = (track_two.parameters(k) for k in ("world", "drive", "fine_tuner", "predictor"))
+    assert drive["wheel_radius_m"] == world["wheels.radius_m"]
+    assert drive["wheel_lever_m"] == pytest.approx((world["wheels.wheelbase_m"] + world["wheels.track_m"]) / 2)
+    assert drive["encoder_radius_m"] == world["encoder_wheels.diameter_m"] / 2
+    assert drive["encoder_v_offset_m"] == world["encoder_wheels.v_wheel_y_m"]
+    assert drive["encoder_u_offset_m"] == world["encoder_wheels.u_wheel_x_m"]
+    assert drive["wheel_speed_rad_s"] <= world["motor.max_speed_rad_s"]
+    for name in ("max_u_m", "max_v_m"):
+        assert tuner[name] <= drive[name] == predictor[name]
+    assert tuner["alignment.max_v_step_m"] <= drive["max_v_m"]
+    assert tuner["alignment.max_u_step_m"] <= drive["max_u_m"]
+    assert tuner["first_step_m"] == track_two.parameters("leader")["step_m"]
+    lens_to_face = FORMATION_DISTANCE_M - world["marker.edge_m"] / 2 - world["camera.y_m"]
+    assert tuner["alignment.distance_m"] == pytest.approx(lens_to_face)
+
+
+# --- the formation ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("heading_deg", [0.0, 37.0, 90.0, 135.0, -120.0])
+@pytest.mark.parametrize("followers", [1, 2, 9])
+def test_each_follower_starts_32_cm_to_the_right_of_its_neighbour_with_the_same_heading(
+    track_two, followers, heading_deg
+):
+    found = override(track_two, [f"followers={followers}", f"heading_deg={heading_deg}"])
+    world = found.parameters("world")
+    assert world["robots"] == ["leader", *(f"follower_{n}" for n in range(1, followers + 1))] == found.robots
+    assert world["start_heading_rad"] == pytest.approx([math.radians(heading_deg)] * (followers + 1))
+    heading = math.radians(heading_deg)
+    for n in range(followers):
+        dx = world["start_x_m"][n + 1] - world["start_x_m"][n]
+        dy = world["start_y_m"][n + 1] - world["start_y_m"][n]
+        assert math.cos(heading) * dx + math.sin(heading) * dy == pytest.approx(0.0, abs=1e-12)  # nothing forward
+        assert -math.sin(heading) * dx + math.cos(heading) * dy == pytest.approx(-0.32)  # to the right
+    assert (world["start_x_m"][0], world["start_y_m"][0]) == (1.412, 0.111)
+
+
+def test_the_leader_waits_for_every_follower_and_each_tick_has_its_listeners(track_two):
+    found = override(track_two, ["followers=3"])
+    assert found.parameters("leader")["followers"] == ["follower_1", "follower_2", "follower_3"]
+    listeners = {robot: found.robot_parameters("fine_tuner", robot)["done_listeners"] for robot in found.robots[1:]}
+    assert listeners == {"follower_1": 2, "follower_2": 2, "follower_3": 1}
+
+
+# --- files and overrides ----------------------------------------------------------------------------------------------
+
+
+def test_a_file_says_only_what_differs_and_is_called_like_itself(write):
+    found = load(write("seed: 7\npredictor:\n  name: previous\nworld:\n  camera: {mode: on_demand}\n"))
+    assert found.setup == Setup(name="mine", seed=7)
+    assert found.sections["predictor"] == {"name": "previous"}
+    assert found.sections["world"] == {"camera.mode": "on_demand"}
+    assert found.parameters("predictor") == {**node_defaults("predictor"), "name": "previous"}
+    assert found.parameters("world")["seed"] == 7
+
+
+def test_an_override_beats_the_file_which_beats_config_which_beats_the_code(write):
+    path = write("predictor:\n  forgetting: 0.9\n  sigma_m: 0.001\n")
+    found = override(load(path), ["predictor.forgetting=0.8"]).parameters("predictor")
+    assert (found["forgetting"], found["sigma_m"], found["max_u_m"]) == (0.8, 0.001, 0.1)
+    assert load(path).parameters("block_detector")["block_filtering"] == 40
+    assert KINDS["block_detector"].parameter_class()().block_filtering == 3
+
+
+def test_the_last_of_several_overrides_counts_and_the_scenario_itself_is_not_changed(track_two):
+    found = override(track_two, ["predictor.forgetting=0.8", "seed=3", "predictor.forgetting=0.7", "seed=4"])
+    assert found.parameters("predictor")["forgetting"] == 0.7
+    assert found.setup.seed == 4
+    assert track_two.setup.seed == 0
+    assert "predictor" not in track_two.sections or "forgetting" not in track_two.sections["predictor"]
+
+
+def test_values_of_overrides_are_yaml(track_two):
+    settings = ["block_detector.signature_range=[1, 2.5]", "world.sleep=false", "name=my run", "drive.max_v_m=0.1"]
+    found = override(track_two, settings)
+    assert found.parameters("block_detector")["signature_range"] == [1.0, 2.5]
+    assert found.parameters("world")["sleep"] is False
+    assert found.setup.name == "my run"
+    assert found.parameters("drive")["max_v_m"] == 0.1
+
+
+def test_a_value_may_hold_an_equals_sign(track_two):
+    found = override(track_two, ["world.surface=plane", "world.surface_parameters=['height_m=0.2']"])
+    found.check()
+    assert found.parameters("world")["surface_parameters"] == ["height_m=0.2"]
+
+
+@pytest.mark.parametrize("surface", sorted(SURFACES))
+def test_another_surface_comes_with_its_own_defaults(track_two, surface):
+    found = with_surface(override(track_two, ["world.surface_parameters=['height_m=0.2']"]), surface)
+    assert found.parameters("world")["surface"] == surface
+    assert found.parameters("world")["surface_parameters"] == []
+    found.check()
+
+
+def test_every_predictor_can_be_chosen(track_two):
+    for name in MODELS:
+        assert override(track_two, [f"predictor.name={name}"]).parameters("predictor")["name"] == name
+    assert set(specs(PredictorParameters)["name"].choices) == set(MODELS)
+
+
+# --- what can be wrong ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("setting", "text"),
+    [
+        ("seed", "--set takes KEY=VALUE, like predictor.forgetting=0.95, not 'seed'"),
+        ("", "--set takes KEY=VALUE"),
+        ("sed=3", "no entry 'sed'; did you mean 'seed'?"),
+        ("predictor=measured", "no entry 'predictor'; did you mean 'predictor.'?"),
+        ("predicter.name=measured", "no node 'predicter'; did you mean 'predictor'?"),
+        (".name=x", "no node ''; there are: "),
+        ("predictor.nam=measured", "no parameter 'nam'; did you mean 'name'?"),
+        ("predictor.name=mesured", "'name' can't be 'mesured'; did you mean 'measured'?"),
+        ("predictor.forgetting=often", "'forgetting' must be of type float, not 'often'"),
+        ("predictor.forgetting=1.5", "'forgetting' is 1.5, outside 0.01 to 1.0"),
+        ("predictor.forgetting=", "'forgetting' must be of type float, not None"),
+        ("predictor.forgetting=.nan", "must be finite"),
+        ("predictor.forgetting=[", "--set predictor.forgetting: '[' is no YAML value"),
+        ("seed=!!python/object:os.system x", "is no YAML value"),
+        ("seed=-1", "'seed' is -1, outside 0 to"),
+        ("seed=1.5", "'seed' must be of type int"),
+        ("followers=0", "'followers' is 0, outside 1 to 9"),
+        ("world.camera.mod=stream", "no parameter 'camera.mod'; did you mean 'camera.mode'?"),
+        ("world.camera.mode=steam", "'camera.mode' can't be 'steam'; did you mean 'stream'?"),
+        ("world.mode=stream", "did you mean 'camera.mode'?"),
+    ],
+)
+def test_a_wrong_override_is_answered_in_one_line_that_helps(track_two, setting, text):
+    assert text in one_line(override, track_two, [setting])
+
+
+def test_a_misspelt_track_suggests_the_near_one():
+    assert one_line(load_track, "tow").startswith("no track 'tow'; did you mean 'two'?")
+    assert "there are: one, one_baseline, two, two_baseline" in one_line(load_track, "xyz")
+
+
+def test_a_misspelt_surface_suggests_the_near_one(track_two):
+    assert "no surface 'bowll'; did you mean 'bowl'?" in one_line(with_surface, track_two, "bowll")
+    wrong = override(track_two, ["world.surface=plain"])
+    assert "did you mean 'plane'?" in one_line(wrong.check)
+
+
+def test_wrong_parameters_of_a_surface_are_found_by_the_check(track_two):
+    wrong = override(track_two, ["world.surface=plane", "world.surface_parameters=['heigth_m=0.1']"])
+    assert "did you mean 'height_m'?" in one_line(wrong.check)
+    wrong = override(track_two, ["world.surface_parameters=['height_m']"])
+    assert "must hold texts like 'height_m=0.1'" in one_line(wrong.check)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "a scenario is a mapping"),
+        ("- seed\n", "a scenario is a mapping"),
+        ("seed: [1, 2\n", "no valid YAML in line"),
+        ("seed: 1\n  name: x\n", "no valid YAML in line 2"),
+        ("seed: !!python/object/apply:os.getcwd []\n", "no valid YAML"),
+        ("sead: 1\n", "no entry 'sead'; did you mean 'seed'?"),
+        ("predicter: {name: previous}\n", "no entry 'predicter'; did you mean 'predictor'?"),
+        ("1: 2\n", "no entry '1'"),
+        ("predictor: previous\n", "'predictor' must hold parameters of that node, not 'previous'"),
+        ("predictor: {nme: previous}\n", "predictor: no parameter 'nme'; did you mean 'name'?"),
+        ("predictor: {name: prevoius}\n", "did you mean 'previous'?"),
+        ("seed: many\n", "'seed' must be of type int, not 'many'"),
+        ("followers: 20\n", "'followers' is 20, outside 1 to 9"),
+        ("name: 3\n", "'name' must be of type str, not 3"),
+    ],
+)
+def test_a_wrong_file_is_answered_in_one_line_that_names_it(write, text, words):
+    path = write(text)
+    found = one_line(load, path)
+    assert found.startswith(str(path))
+    assert words in found
+
+
+def test_a_missing_file_a_folder_and_a_picture_are_no_scenarios(tmp_path):
+    assert "can't read it: No such file" in one_line(load, tmp_path / "missing.yaml")
+    assert "can't read it" in one_line(load, tmp_path)
+    (tmp_path / "picture.yaml").write_bytes(b"\x89PNG\xff\xfe")
+    assert "can't read it" in one_line(load, tmp_path / "picture.yaml")
+
+
+@pytest.mark.parametrize("text", ["", "- 1\n", "drive: {}\n", "'/**': 3\n", "'/**': {ros__parameters: 3}\n"])
+def test_a_config_file_of_another_form_is_answered_with_the_form_it_needs(tmp_path, monkeypatch, text):
+    (tmp_path / "drive.yaml").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(module, "config_dir", lambda: tmp_path)
+    assert re.search("drive.yaml: a ROS parameter file begins with", one_line(node_defaults, "drive"))
