@@ -6,5 +6,6 @@ DONE = 0
 ERROR = 1
 BAD_INPUT = 2
 LOST = 3
+"""A follower lost its beacon neighbour from view, or a robot left the plate."""
 NODE_DIED = 4
 INTERRUPTED = 130

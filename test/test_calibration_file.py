@@ -80,7 +80,7 @@ def test_a_robot_that_the_file_lacks_is_refused(file):
     with pytest.raises(CalibrationError, match=r"no robot 'follower_2', only leader, follower_1"):
         DriveComponent(with_file(file), Place("follower_2"))
     with pytest.raises(CalibrationError, match="follower_2"):
-        scenario(file, "followers=2").check()
+        scenario(file, "followers=2", "world.surface_parameters=['size_m=3.0']").check()
 
 
 def test_robots_of_another_seed_or_make_are_refused_by_name(tmp_path):

@@ -7,10 +7,10 @@ import pytest
 from component_helpers import wired
 
 from robot_formation import conversions
-from robot_formation.components.world import surface_mesh, surface_values
+from robot_formation.components.world import surface_mesh
 from robot_formation.control.drive import WHEELS, WheelCommand
 from robot_formation.parameters import ParameterError
-from robot_formation.surface import make_surface
+from robot_formation.surface import make_surface, surface_from_texts
 
 COMMANDS, REQUEST, IMAGE = "follower_1/joint_commands", "follower_1/camera/request", "follower_1/camera/image_raw"
 
@@ -41,7 +41,8 @@ def of(sent, topic):
 
 def test_the_start_shows_the_ground_the_cameras_the_clock_and_every_robot(wire):
     topics = [topic for topic, _ in wire.sent]
-    assert topics[:3] == ["surface", "follower_1/camera/camera_info", "/clock"]
+    assert topics[:2] == ["surface", "follower_1/camera/camera_info"]
+    assert {"/clock", "leader/robot_description", "follower_1/robot_description"} <= set(topics)
     for robot in ("leader", "follower_1"):
         assert {f"ground_truth/{robot}/{what}" for what in ("odom", "pose", "path")} <= set(topics)
     (info,) = of(wire.sent, "follower_1/camera/camera_info")
@@ -182,10 +183,10 @@ def test_robots_need_different_names_and_a_start_each(values):
 
 
 def test_surface_parameters_are_names_and_numbers():
-    assert surface_values(("height_m=0.1", "slope = 2e-3")) == {"height_m": 0.1, "slope ": 0.002}
+    assert surface_from_texts("plane", ("height_m=0.1",)).height(0.5, 0.5) == 0.1
     for bad in ("height_m", "height_m=", "height_m=high"):
-        with pytest.raises(ParameterError, match=r"must hold texts like 'height_m=0\.1'"):
-            surface_values((bad,))
+        with pytest.raises(ParameterError, match="plane"):
+            surface_from_texts("plane", (bad,))
 
 
 def test_an_unknown_surface_is_refused_with_the_near_name():

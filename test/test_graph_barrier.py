@@ -60,7 +60,7 @@ class Witness:
 
 @pytest.mark.parametrize("followers", [1, 2])
 def test_a_follower_hears_nothing_but_itself_and_its_neighbours_tick(tmp_path, monkeypatch, followers):
-    scenario = short_scenario(f"followers={followers}", "leader.timesteps=3")
+    scenario = short_scenario(f"followers={followers}", "leader.timesteps=3", track="one")
     witness = Witness(scenario.robots, monkeypatch)
     result = launch(scenario, tmp_path / "bag", on_start=witness.started)
     witness.finish()

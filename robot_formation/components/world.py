@@ -83,8 +83,6 @@ class WorldComponent(Component):
         self._next = parameters
         self._paused = False
         self._cameras = [start.name for start in parameters.starts() if start.camera]
-        self._moving: set[str] = set()
-        self._numbers = dict.fromkeys(parameters.robots, "")  # of each robot's last command, echoed to its drive
         # Topics are made once: a run sends thousands of messages.
         self._joint_states = {name: names.joint_states(name) for name in parameters.robots}
         self._images = {name: names.camera_image(name) for name in self._cameras}
@@ -96,6 +94,8 @@ class WorldComponent(Component):
         self._world = World(surface, parameters.starts(), parameters, seed=parameters.seed, start_ns=start_ns)
         self._surface = surface
         self._parameters = parameters
+        self._moving: set[str] = set()
+        self._numbers = dict.fromkeys(parameters.robots, "")  # of each robot's last command, echoed to its drive
         self._paths: dict[str, list[Any]] = {name: [] for name in parameters.robots}
         self._overhead = OverheadView(surface, parameters, parameters.seed)
         self.stamp_ns = start_ns
@@ -227,8 +227,11 @@ class WorldComponent(Component):
             self.warn(f"{robot}: {error}; nothing moves")
             if robot in self._moving:
                 return
-            # A hold: who waits for the motion's end gets one.
-            self._world.command(robot, (0.0,) * 4, (1.0,) * 4)
+            try:
+                # A hold: who waits for the motion's end gets one.
+                self._world.command(robot, (0.0,) * 4, (1.0,) * 4)
+            except ValueError:
+                return  # a robot that takes no commands at all any more
         self._numbers[robot] = message.header.frame_id
         self._moving.add(robot)
 

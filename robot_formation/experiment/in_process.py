@@ -61,7 +61,7 @@ class InProcessRun:
                 self._handlers.setdefault(name, []).append(entry.handler)
 
     def run(self) -> tuple[int, str]:
-        """Run until a component ends; return its exit code (0 done, 3 lost or off the plate) and its reason unless it was done.
+        """Run until a component ends; return its exit code (0 done, 3 lost or off the plate), and why unless done.
 
         Raises:
             RunError: if everybody waits for somebody, which no run should come to.

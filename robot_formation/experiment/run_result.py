@@ -22,7 +22,7 @@ class NodeUsage:
 
 @dataclass
 class RunResult:
-    """Exit code (0 done, 3 lost or off the plate, 4 a node died, 130 interrupted), the reason if there is one, the bag and the costs.
+    """How a run ended: exit code (see exit_codes), the reason if there is one, the bag and the costs.
 
     Wall time is told apart: until the first sign of life from a robot, from there to the run's end, and what ending the
     nodes in good order took. A run in one process only has the middle part.
