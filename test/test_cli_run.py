@@ -104,6 +104,8 @@ def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(t
     assert json_of(formation("analyze", bag, "--json")) == run
 
 
+@pytest.mark.graph
+@pytest.mark.xdist_group("graph")
 def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_path):
     from mcap.reader import make_reader
 
@@ -128,6 +130,8 @@ def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_pa
         assert opened.metadata("robot_formation")["predictor"] == "measured"
 
 
+@pytest.mark.graph
+@pytest.mark.xdist_group("graph")
 def test_images_are_recorded_on_request(tmp_path):
     bag = tmp_path / "bag"
     options = ("--camera", "on_demand", "--set", "leader.timesteps=1", "--images", "--json")

@@ -119,7 +119,7 @@ class Launcher:
                     return exit_codes.INTERRUPTED, "interrupted"
                 ended = next((child for child in self._children if child.poll() is not None), None)
                 if ended is not None:
-                    monitor.spin(_POLL_S)
+                    monitor.drain(_POLL_S)
                     return self._verdict(ended)
                 if now - last > silence_s:
                     return exit_codes.NODE_DIED, f"no node has shown a sign of life for {silence_s:.0f} s"

@@ -20,6 +20,7 @@ from robot_formation.nodes.host import qos_profile
 
 # Nodes whose names begin with an underscore are hidden: nobody waits for them, and lists leave them out.
 _NAME = "_monitor"
+_QUIET_ROUNDS, _MOST_ROUNDS = 3, 60
 # What a process must have in common with the run's nodes to find them at once, and where rclpy writes its log.
 _JOINING = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOG_DIR")
 
@@ -76,6 +77,16 @@ class Monitor:
         while self.messages != before:
             before = self.messages
             self._executor.spin_once(0.0)
+
+    def drain(self, round_s: float) -> None:
+        """Take what is still on its way: until some rounds in a row have brought nothing."""
+        quiet = 0
+        for _ in range(_MOST_ROUNDS):
+            before = self.messages
+            self.spin(round_s)
+            quiet = quiet + 1 if self.messages == before else 0
+            if quiet == _QUIET_ROUNDS:
+                return
 
     def __enter__(self) -> Monitor:
         return self
