@@ -51,9 +51,7 @@ def through_the_graph(mode, folder):
         "wall_s": wall_s,
         "startup_s": result.startup_s,
         "stopping_s": result.stopping_s,
-        "driving_s": result.running_s,
         "simulated_s": simulated_s,
-        "real_time_factor": simulated_s / result.running_s,
         "processor_s": processor_s,
         "share": {name: usage.processor_s / processor_s for name, usage in result.usage.items()},
         "peak_memory_mb": sum(usage.peak_memory_mb for usage in result.usage.values()),
@@ -87,6 +85,18 @@ def median_of(rounds):
     return found
 
 
+def add_real_time_factor(found):
+    """From start to end less the fastest start of all rounds.
+
+    The first sign of life reaches the launcher late if discovery is slow, so a round's own start would flatter it.
+    """
+    graph = [r for (name, _), values in found.items() for r in values if name == "through_the_graph"]
+    startup_s = min(r["startup_s"] for r in graph)
+    for r in graph:
+        r["driving_s"] = r["wall_s"] - r["stopping_s"] - startup_s
+        r["real_time_factor"] = r["simulated_s"] / r["driving_s"]
+
+
 def measure(rounds):
     ways = {(way.__name__, mode): way for way in (through_the_graph, in_process) for mode in AIMS}
     found = {key: [] for key in ways}
@@ -94,6 +104,7 @@ def measure(rounds):
         for (name, mode), way in ways.items():
             with tempfile.TemporaryDirectory() as folder:
                 found[name, mode].append(way(mode, Path(folder)))
+    add_real_time_factor(found)
     return {f"{name} {mode}": median_of(values) for (name, mode), values in found.items()}
 
 
