@@ -38,7 +38,7 @@ def shared_memory_ports(domain):
 
 @pytest.mark.parametrize("node", NODES)
 def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path, node):
-    killer = Killer(node, signal.SIGKILL, after_timesteps=2)
+    killer = Killer(node, signal.SIGKILL, after_timesteps=3)
     domains = []
 
     def on_start(domain, pids):
@@ -51,7 +51,7 @@ def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path, node):
     assert set(killer.pids) == set(NODES)
     assert not any(alive(pid) for pid in killer.pids.values())
     analysis = analyse(load_run(tmp_path / "bag"))
-    # The kill falls into timestep 3 or later, as fast as the signal came; what was finished before is there.
+    # The signal comes when timestep 3 is told, which may be before its tick: what was finished before is there.
     assert len(analysis.followers[0].timesteps) >= 2
     assert analysis.outcome == "incomplete"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bag"]

@@ -9,7 +9,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 def make_executor(context: Context | None = None) -> Executor:
     """Make rclpy's event-driven executor where this rclpy has it, else the stock single-threaded one.
 
-    The stock one builds a wait set of all entities for every callback; the event-driven one costs about a sixth
+    The stock one builds a wait set of all entities for every callback; the event-driven one costs about an eighth
     (bench/executors.py), which decides how fast a run of small messages goes.
     """
     try:

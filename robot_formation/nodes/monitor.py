@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -97,6 +98,9 @@ class Monitor:
         self._executor.shutdown()
         self._node.destroy_node()
         rclpy.shutdown(context=self._context)
+        # The shared memory of this participant is given back with the last reference, and rclpy's objects form cycles.
+        del self._executor, self._node, self._context
+        gc.collect()
 
     def _take(self, topic: str, message: Any) -> None:
         self.messages += 1

@@ -27,7 +27,8 @@ from robot_formation.parameters import ParameterError, parameter
 
 _DISCOVERY_S = 0.05
 _TICK_TYPE = "std_msgs/msg/UInt32"
-_AFTER_TICK_S = 0.05  # what belongs to a timestep arrives well within this after its tick
+_AFTER_TICK_S = 0.01  # what belongs to a timestep arrives well within this after its tick
+_IDLE_S = 0.05
 _ROUND_S = 0.03
 _QUIET_ROUNDS = 4  # without a message after the signal to end: everything sent has arrived
 _LONGEST_DRAIN_S = 5.0
@@ -72,7 +73,7 @@ class RecorderNode:
         try:
             while not stopped():
                 before = self._messages
-                executor.spin_once(_AFTER_TICK_S)
+                executor.spin_once(_IDLE_S if self._tick_at is None else _AFTER_TICK_S)
                 self._end_chunk(idle=self._messages == before)
             timer.cancel()
             self._drain(executor)
