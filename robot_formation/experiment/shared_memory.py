@@ -52,7 +52,7 @@ def fast_dds_files(folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
 
 def find_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
     """List the groups of files whose owners are all dead; removes nothing. Arguments as for clean_orphans."""
-    groups = {group: names for group, names in fast_dds_files(folder).items() if _belongs(group, domain)}
+    groups = {group: names for group, names in fast_dds_files(folder).items() if is_of_domain(group, domain)}
     if not groups:
         return {}
     in_use = _used_files(folder)
@@ -83,8 +83,8 @@ def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> li
     return removed
 
 
-def _belongs(group: str, domain: int | None) -> bool:
-    """Tell whether a group may be removed when cleaning up after this domain."""
+def is_of_domain(group: str, domain: int | None) -> bool:
+    """Tell whether a group may be one of this domain: a segment, a port of the domain, or one that all share."""
     match = _NAME.fullmatch(group)
     if domain is None or match is None or match["port"] is None:
         return True

@@ -20,16 +20,26 @@ from robot_formation.experiment.domain import DomainReservation
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
-from robot_formation.experiment.shared_memory import clean_orphans
+from robot_formation.experiment.shared_memory import clean_orphans, fast_dds_files, is_of_domain
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
 from robot_formation.launching.processes import RECORDER, processes
 
 _POLL_S = 0.05
+_CLEANING_ROUNDS = 6
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
 _RECORDER_STOP_SIGNALS = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 1.0))
+
+
+def _clean_shared_memory(domain: int) -> None:
+    """Remove what dead processes left; twice or more, since the middleware lets go of the last files in its own time."""
+    for _ in range(_CLEANING_ROUNDS):
+        clean_orphans()
+        if not any(is_of_domain(group, domain) for group in fast_dds_files()):
+            return
+        time.sleep(_POLL_S)
 
 
 @dataclass
@@ -71,7 +81,7 @@ class Launcher:
             domain = stack.enter_context(DomainReservation())
             stack.enter_context(self._signals())
             # Those of every domain: also what a run left whose launcher was killed itself.
-            stack.callback(clean_orphans)
+            stack.callback(_clean_shared_memory, domain)
             result = RunResult(exit_codes.NODE_DIED, self.bag)
             began = time.monotonic()
             try:
