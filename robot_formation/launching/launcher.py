@@ -34,7 +34,7 @@ _RECORDER_STOP_SIGNALS = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.
 
 
 def _clean_shared_memory(domain: int) -> None:
-    """Remove what dead processes left; twice or more, since the middleware lets go of the last files in its own time."""
+    """Remove what dead processes left, in rounds: the middleware lets go of the last files in its own time."""
     for _ in range(_CLEANING_ROUNDS):
         clean_orphans()
         if not any(is_of_domain(group, domain) for group in fast_dds_files()):
