@@ -23,10 +23,16 @@ class PredictorComponent(Component):
         self._predictor = Predictor(parameters)
         self._displacements: dict[int, Any] = {}
         self._residuals: dict[int, Any] = {}
+        self._commanded: dict[int, Any] = {}
+        self._first_commanded_ns: int | None = None
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
-        return [Input(names.DISPLACEMENT, self._on_displacement), Input(names.RESIDUAL, self._on_residual)]
+        return [
+            Input(names.COMMANDED, self._on_commanded),
+            Input(names.DISPLACEMENT, self._on_displacement),
+            Input(names.RESIDUAL, self._on_residual),
+        ]
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
@@ -55,15 +61,30 @@ class PredictorComponent(Component):
         self._residuals[conversions.stamp_of(message)] = message
         self._answer(conversions.stamp_of(message))
 
+    def _on_commanded(self, message: Any) -> None:
+        stamp_ns = conversions.stamp_of(message)
+        if self._first_commanded_ns is None:
+            self._first_commanded_ns = stamp_ns
+        self._commanded[stamp_ns] = message
+        self._answer(stamp_ns)
+
     def _answer(self, stamp_ns: int) -> None:
-        """Predict once both halves of the pair are here, whichever came first."""
+        """Predict once all parts of the timestep are here, in whatever order they came.
+
+        `commanded` is waited for only after it has been heard of in an earlier timestep: whoever sends none gets
+        answers too, and what is heard doesn't depend on the order in which topics arrive.
+        """
         if stamp_ns not in self._displacements or stamp_ns not in self._residuals:
             return
-        motion = conversions.read_displacement(self._displacements.pop(stamp_ns))
-        self._residuals.pop(stamp_ns)  # the predictors of the paper don't use it
+        expected = self._first_commanded_ns is not None and self._first_commanded_ns < stamp_ns
+        if expected and stamp_ns not in self._commanded:
+            return
         self.stamp_ns = stamp_ns
+        displacement = _uv(self._displacements.pop(stamp_ns))
+        residual = _uv(self._residuals.pop(stamp_ns))
+        commanded = _uv(self._commanded.pop(stamp_ns)) if expected else None
         try:
-            self._predictor.observe(motion.u_m, motion.v_m)
+            self._predictor.observe(displacement, residual, commanded)
         except PredictionError as error:
             self.warn(str(error))
         try:
@@ -72,10 +93,18 @@ class PredictorComponent(Component):
             self.warn(f"{error}; answering with no motion")
             self._send_prediction(Motion(), conversions.NO_ESTIMATE)
             return
-        covariance = _TO_XY @ forecast.covariance @ _TO_XY.T
-        u_m, v_m = forecast.mean.tolist()
+        covariance = _TO_XY @ forecast.about_command @ _TO_XY.T
+        u_m, v_m = forecast.command.tolist()
         self._send_prediction(Motion.from_uv(u_m, v_m), covariance.ravel().tolist())
 
     def _send_prediction(self, mean: Motion, covariance: Any) -> None:
         base = self.place.frame(names.BASE_FRAME)
         self._send(names.PREDICTION, conversions.displacement(mean, base, self.stamp_ns, covariance))
+
+
+def _uv(message: Any) -> Any:
+    """Read (u, v) [m] of a displacement, None where there is no estimate."""
+    if not conversions.has_estimate(message):
+        return None
+    motion = conversions.read_displacement(message)
+    return np.array([motion.u_m, motion.v_m])
