@@ -48,6 +48,8 @@ setup(
             "colcon-common-extensions",
             "hypothesis",
             "mypy",
+            "odmd",
+            "pykoop",
             "pytest",
             "pytest-xdist",
             "ruff",
