@@ -10,7 +10,7 @@ filter: the total is known well, the camera says what is left. A model forecasts
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -103,8 +103,12 @@ class ResidualFilter:
 class Closing:
     """A model of w, with the residual closed and the actuation bias learned."""
 
-    def __init__(self, parameters: ClosingParameters, model: Model) -> None:
+    def __init__(
+        self, parameters: ClosingParameters, model: Model, judge: Callable[[Vector], None] | None = None
+    ) -> None:
+        """Put the closing around a model; `judge` is told every w as the camera saw it, before the model gets it."""
         self._model = model
+        self._judge = judge
         self._filter = ResidualFilter(parameters)
         self._bias = TrendFilter(parameters.bias)
         self._bias.start(np.zeros(2), parameters.bias_m)
@@ -120,6 +124,8 @@ class Closing:
         if not self._seen:  # nothing is known about residuals: displacements are all there is
             self._model.observe(displacement)
             return
+        if self._judge is not None and residual is not None:
+            self._judge(displacement + residual - self._filter.residual)
         self._filter.observe(displacement, residual)
         self._model.observe(self._filter.step)
 

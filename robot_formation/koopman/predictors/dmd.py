@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from robot_formation.koopman.online_dmd import OnlineDMD
-from robot_formation.koopman.predictors.models import Insight, Matrix, Vector
-from robot_formation.koopman.predictors.parameters import PredictorParameters
+from robot_formation.koopman.predictors.dictionary_text import dictionary_from_text
+from robot_formation.koopman.predictors.models import Insight, Matrix, Vector, optional, vector
+from robot_formation.koopman.predictors.parameters import EdmdParameters, PredictorParameters
+from robot_formation.koopman.windowed_dmd import WindowedDMD
 
 # An open-loop power of K may grow as it likes; this is far beyond any forecast and far below overflow.
 _LARGEST_STATE_M = 1e100
@@ -48,6 +50,20 @@ class Literal:
             condition = float(np.linalg.cond(np.column_stack(self._collected[:-1])))
         return Insight(k=self._k, condition_number=condition)
 
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return {
+            "collected": [x.tolist() for x in self._collected],
+            "k": None if self._k is None else self._k.tolist(),
+            "state": self._state.tolist(),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        self._collected = [vector(x) for x in state["collected"]]
+        self._k = None if state["k"] is None else np.array(state["k"], dtype=float).reshape(2, 2)
+        self._state = vector(state["state"])
+
 
 class Measured:
     """Online DMD with measured pairs: what the paper's algorithm must have been to react to anything.
@@ -79,3 +95,83 @@ class Measured:
         if self._pairs < 2:
             return Insight()
         return Insight(self._dmd.k, self._dmd.condition_number, self._innovation)
+
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return {
+            "dmd": self._dmd.state(),
+            "pairs": self._pairs,
+            "last": optional(self._last),
+            "innovation": optional(self._innovation),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        self._dmd = OnlineDMD.from_state(state["dmd"])
+        self._pairs = int(state["pairs"])
+        self._last = vector(state["last"]) if state["last"] is not None else None
+        self._innovation = vector(state["innovation"]) if state["innovation"] is not None else None
+
+
+class Edmd:
+    """Online EDMD with a dictionary of the user's: K Psi(x_t), with persistence (K = I) as the prior.
+
+    Displacements are divided by a length first, so that observables of different degree are alike in size.
+    """
+
+    def __init__(self, parameters: PredictorParameters | EdmdParameters) -> None:
+        p = self._p = parameters.edmd if isinstance(parameters, PredictorParameters) else parameters
+        self._dictionary = dictionary_from_text(p.dictionary)
+        size = self._dictionary.size
+        self._dmd: OnlineDMD | WindowedDMD = (
+            WindowedDMD(size, p.window, forgetting=p.forgetting, prior_weight=p.prior)
+            if p.window
+            else OnlineDMD(size, forgetting=p.forgetting, prior_weight=p.prior)
+        )
+        self._history: list[Vector] = []
+        self._lifted: Vector | None = None
+        self._innovation: Vector | None = None
+
+    def observe(self, x: Vector) -> None:
+        """See `Model`."""
+        self._history = [*self._history[-self._dictionary.history :], x] if self._dictionary.history else [x]
+        if len(self._history) <= self._dictionary.history:
+            return
+        lifted = self._dictionary(np.column_stack(self._history) / self._p.scale_m)[:, 0]
+        if self._lifted is not None:
+            self._innovation = self._dmd.update(self._lifted, lifted)
+        self._lifted = lifted
+
+    def forecast(self) -> Vector:
+        """See `Model`; the last displacement until the delays are filled."""
+        if self._lifted is None:
+            return self._history[-1]
+        rows = list(self._dictionary.state_rows)
+        return np.asarray(self._p.scale_m * (self._dmd.k[rows] @ self._lifted), dtype=float)
+
+    def insight(self) -> Insight:
+        """See `Model`; the innovation is that of the state, in metres."""
+        rows = list(self._dictionary.state_rows)
+        innovation = None if self._innovation is None else self._p.scale_m * self._innovation[rows]
+        notes = {"observables": ", ".join(self._dictionary.names)}
+        return Insight(self._dmd.k, self._dmd.condition_number, innovation, notes)
+
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return {
+            "dmd": self._dmd.state(),
+            "history": [x.tolist() for x in self._history],
+            "lifted": optional(self._lifted),
+            "innovation": optional(self._innovation),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        dmd = type(self._dmd).from_state(state["dmd"])
+        size = self._dictionary.size
+        if dmd.k.shape != (size, size):
+            raise ValueError("it was learned with another dictionary")
+        self._dmd = dmd
+        self._history = [vector(x) for x in state["history"]]
+        self._lifted = vector(state["lifted"], size) if state["lifted"] is not None else None
+        self._innovation = vector(state["innovation"], size) if state["innovation"] is not None else None

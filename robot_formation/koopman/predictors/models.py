@@ -101,7 +101,7 @@ class Ewma:
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""
-        return {"mean": None if self._mean is None else self._mean.tolist()}
+        return {"mean": optional(self._mean)}
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """See `Model`."""
@@ -148,18 +148,14 @@ class TrendFilter:
 
     def state(self) -> dict[str, Any]:
         """Take all that it has learned."""
-        known = self._state is not None
         return {
-            "state": self._state.tolist() if self._state is not None else None,
-            "covariance": self._covariance.tolist() if known else None,
+            "state": None if self._state is None else self._state.tolist(),
+            "covariance": self._covariance.tolist(),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Put back what `state` took."""
-        if state["state"] is None:
-            self._state = None
-            return
-        self._state = np.array(state["state"], dtype=float).reshape(2, 2)
+        self._state = None if state["state"] is None else np.array(state["state"], dtype=float).reshape(2, 2)
         self._covariance = np.array(state["covariance"], dtype=float).reshape(2, 2)
 
 
@@ -190,13 +186,18 @@ class KalmanTrend:
         self._filter.restore(state)
 
 
-def vector(values: Any) -> Vector:
-    """Read a vector (2,) from a state.
+def vector(values: Any, size: int = 2) -> Vector:
+    """Read a vector from a state.
 
     Raises:
-        ValueError: if it is none, or not finite.
+        ValueError: if it has another length, or is not finite.
     """
     found = np.array(values, dtype=float)
-    if found.shape != (2,) or not np.isfinite(found).all():
-        raise ValueError("two finite numbers are expected")
+    if found.shape != (size,) or not np.isfinite(found).all():
+        raise ValueError(f"{size} finite numbers are expected")
     return found
+
+
+def optional(values: Vector | None) -> list[float] | None:
+    """Write a vector that may be missing into a state."""
+    return None if values is None else [float(value) for value in values]

@@ -46,9 +46,8 @@ class EdmdParameters:
         "Observables, separated by spaces: constant, identity, monomials:DEGREE, rbf:COUNT, delay:COUNT",
     )
     prior: float = parameter(
-        1e-4,
-        "Weight of the prior (K = persistence), as the squared length of the data that would outweigh it",
-        unit="m^2",
+        0.01,
+        "Weight of the prior (K = I), as the squared length of an observable that counts as much",
         low=1e-12,
         high=1e6,
     )
@@ -123,9 +122,18 @@ class ClosingParameters:
 
 @dataclass(frozen=True)
 class FormationParameters:
-    """The project's own predictor: models combined by how well each has forecast lately."""
+    """The project's own predictor: models combined by how well each has forecast lately, residual and bias closed."""
 
     discount: float = parameter(0.9, "Weight of a past error relative to the next newer one", low=0.01, high=1.0)
+    handicap: float = parameter(
+        1.0,
+        "How much the Koopman model is behind persistence at first (logarithm of the weights' ratio)",
+        low=0.0,
+        high=100.0,
+    )
+    scale_u_m: float = parameter(0.006, "Error along u that makes a model unlikely", unit="m", low=1e-6, high=1.0)
+    scale_v_m: float = parameter(0.003, "Error along v that makes a model unlikely", unit="m", low=1e-6, high=1.0)
+    edmd: EdmdParameters = EdmdParameters(prior=1.0, forgetting=0.9)
 
 
 @dataclass(frozen=True)

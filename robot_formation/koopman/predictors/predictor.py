@@ -5,14 +5,15 @@ State x_t = (u_t, v_t): the follower's measured total displacement of timestep t
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from robot_formation.errors import FormationError
 from robot_formation.koopman.predictors.closing import Closing
-from robot_formation.koopman.predictors.dmd import Literal, Measured
+from robot_formation.koopman.predictors.dmd import Edmd, Literal, Measured
 from robot_formation.koopman.predictors.formation import Mixture
 from robot_formation.koopman.predictors.models import (
     Ewma,
@@ -22,6 +23,8 @@ from robot_formation.koopman.predictors.models import (
     Model,
     Previous,
     Vector,
+    optional,
+    vector,
 )
 from robot_formation.koopman.predictors.parameters import NAMES, PredictorParameters
 from robot_formation.parameters import suggestion
@@ -36,6 +39,7 @@ MODELS: dict[str, Callable[[PredictorParameters], Model]] = {
     "kalman_trend": KalmanTrend,
     "literal": Literal,
     "measured": Measured,
+    "edmd": Edmd,
     "formation": Mixture,
 }
 
@@ -75,9 +79,11 @@ class Predictor:
         if name not in NAMES:
             raise PredictionError(f"no predictor '{name}'{suggestion(name, NAMES)}")
         self._model = MODELS[name.removesuffix(CLOSE)](parameters)
-        self._closing = (
-            Closing(parameters.closing, self._model) if name.endswith(CLOSE) or name == "formation" else None
-        )
+        self._closing: Closing | None = None
+        if isinstance(self._model, Mixture):
+            self._closing = Closing(parameters.closing, self._model, self._model.judge)
+        elif name.endswith(CLOSE):
+            self._closing = Closing(parameters.closing, self._model)
         self._errors: Matrix = np.diag([parameters.sigma_u_m, parameters.sigma_v_m]) ** 2 * parameters.sigma_weight
         self._weight = parameters.sigma_weight
         self._expected: Vector | None = None
@@ -124,6 +130,37 @@ class Predictor:
         mean = self._expected.copy()
         command = mean if self._closing is None else self._bounded(mean - self._closing.bias())
         return Forecast(mean, self._errors / self._weight, command)
+
+    def state(self) -> dict[str, Any]:
+        """Take all that it has learned, as numbers, lists, text and None (JSON)."""
+        return {
+            "name": self.name,
+            "model": self._model.state() if self._closing is None else self._closing.state(),
+            "errors": self._errors.tolist(),
+            "weight": self._weight,
+            "expected": optional(self._expected),
+            "observations": self.observations,
+        }
+
+    @classmethod
+    def from_state(cls, parameters: PredictorParameters, state: Mapping[str, Any]) -> Predictor:
+        """Make a predictor that goes on where another one's `state` was taken.
+
+        Raises:
+            PredictionError: if the state is damaged, or of a predictor with another name or other parameters.
+        """
+        predictor = cls(parameters)
+        try:
+            if state["name"] != parameters.name:
+                raise ValueError(f"it is of '{state['name']}', not of '{parameters.name}'")
+            (predictor._model if predictor._closing is None else predictor._closing).restore(state["model"])
+            predictor._errors = np.array(state["errors"], dtype=float).reshape(2, 2)
+            predictor._weight = float(state["weight"])
+            predictor._expected = None if state["expected"] is None else vector(state["expected"])
+            predictor.observations = int(state["observations"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise PredictionError(f"the stored state of the predictor can't be used: {error}") from None
+        return predictor
 
     def insight(self) -> Insight:
         """Show K, condition number and innovation where the model has them."""
