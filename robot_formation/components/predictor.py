@@ -53,6 +53,14 @@ class PredictorComponent(Component):
             values["condition number"] = f"{insight.condition_number:.4g}"
         return values
 
+    def actuation_bias(self) -> tuple[float, float]:
+        """By how much (u, v) the robot is expected to go farther than it is told, metres; zero if that isn't learned."""
+        if not self._predictor.observations:
+            return (0.0, 0.0)
+        forecast = self._predictor.predict()
+        u_m, v_m = (forecast.mean - forecast.command).tolist()
+        return (u_m, v_m)
+
     def _on_displacement(self, message: Any) -> None:
         self._displacements[conversions.stamp_of(message)] = message
         self._answer(conversions.stamp_of(message))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.koopman.predictors.models import Insight, Model, TrendFilter, Vector, vector
+from robot_formation.koopman.predictors.models import Insight, Matrix, Model, TrendFilter, Vector
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 
 # A move that ends farther from its command has met an obstacle or was never carried out.
@@ -43,13 +43,13 @@ class ResidualFilter:
         sigmas = np.array(
             [[p.start_u_m, p.step_sigma_u_m, p.trend_start_m], [p.start_v_m, p.step_sigma_v_m, p.trend_start_m]]
         )
-        self._covariances = np.repeat((np.eye(3) * sigmas[:, None, :] ** 2)[None], count, axis=0)
+        self._covariances: NDArray[np.float64] = np.repeat((np.eye(3) * sigmas[:, None, :] ** 2)[None], count, axis=0)
         self._go = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, p.trend_damping], [0.0, 0.0, p.trend_damping]])
         self._noise = np.square(p.noise_m)[:, None]
         self._drift = np.zeros((count, 1, 3, 3))
         self._drift[:, 0, 1, 1] = np.square(p.level_m)
         self._drift[:, 0, 2, 2] = np.square(p.trend_m)
-        self._losses = np.zeros((count, 2))
+        self._losses: Matrix = np.zeros((count, 2))
 
     def observe(self, total: Vector, residual: Vector | None) -> None:
         """Take the total displacement (2,) of a timestep and the camera's residual (2,), None if it saw none."""

@@ -122,6 +122,7 @@ class Edmd:
     def __init__(self, parameters: PredictorParameters | EdmdParameters) -> None:
         p = self._p = parameters.edmd if isinstance(parameters, PredictorParameters) else parameters
         self._dictionary = dictionary_from_text(p.dictionary)
+        self._rows = [row for row in self._dictionary.state_rows if row is not None]
         size = self._dictionary.size
         self._dmd: OnlineDMD | WindowedDMD = (
             WindowedDMD(size, p.window, forgetting=p.forgetting, prior_weight=p.prior)
@@ -146,13 +147,11 @@ class Edmd:
         """See `Model`; the last displacement until the delays are filled."""
         if self._lifted is None:
             return self._history[-1]
-        rows = list(self._dictionary.state_rows)
-        return np.asarray(self._p.scale_m * (self._dmd.k[rows] @ self._lifted), dtype=float)
+        return np.asarray(self._p.scale_m * (self._dmd.k[self._rows] @ self._lifted))
 
     def insight(self) -> Insight:
         """See `Model`; the innovation is that of the state, in metres."""
-        rows = list(self._dictionary.state_rows)
-        innovation = None if self._innovation is None else self._p.scale_m * self._innovation[rows]
+        innovation = None if self._innovation is None else self._p.scale_m * self._innovation[self._rows]
         notes = {"observables": ", ".join(self._dictionary.names)}
         return Insight(self._dmd.k, self._dmd.condition_number, innovation, notes)
 

@@ -150,9 +150,9 @@ class PredictorParameters:
         0.005, "Standard deviation of a forecast along u before errors tell", unit="m", low=0.0, high=1.0
     )
     sigma_v_m: float = parameter(
-        0.005, "Standard deviation of a forecast along v before errors tell", unit="m", low=0.0, high=1.0
+        0.003, "Standard deviation of a forecast along v before errors tell", unit="m", low=0.0, high=1.0
     )
-    sigma_weight: float = parameter(3.0, "How many forecasts these standard deviations count for", low=0.01, high=1e6)
+    sigma_weight: float = parameter(2.0, "How many forecasts these standard deviations count for", low=0.01, high=1e6)
     ewma: EwmaParameters = EwmaParameters()
     kalman_trend: TrendParameters = TrendParameters()
     edmd: EdmdParameters = EdmdParameters()
