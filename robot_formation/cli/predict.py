@@ -79,13 +79,13 @@ def run(args: argparse.Namespace) -> int:
 
     chosen = predictors(args.predictor, args.set)
     log = read(args)
-    _warn_of_bounds(log, chosen[0])
     forecasts = []
     for parameters in chosen:
         if len(log) >= _LONG:
             print(f"{parameters.name}: {len(log)} timesteps", file=sys.stderr, flush=True)
         forecasts.append(forecast_log(log, parameters))
     picture = _draw(args, log, forecasts)
+    _warn_of_bounds(log, chosen[0])
     if args.json:
         print(json.dumps({"predictors": {found.name: found.to_json() for found in forecasts}}, allow_nan=False))
         return 0
@@ -173,7 +173,7 @@ def _warn_of_bounds(log: DisplacementLog, parameters: PredictorParameters) -> No
         if beyond:
             name = f"predictor.max_{'uv'[axis]}_m"
             print(
-                f"warning: {beyond} displacements are longer than {name}={bound_m:g}, to which forecasts are cut; "
+                f"warning: {beyond} displacement(s) longer than {name}={bound_m:g}, to which forecasts are cut; "
                 f"raise it by --set {name}=...",
                 file=sys.stderr,
             )
