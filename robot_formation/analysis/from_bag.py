@@ -13,13 +13,16 @@ from typing import Any
 import numpy as np
 
 from robot_formation import names
+from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
 from robot_formation.bag.reader import Bag, read_bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.control.motion import Motion
+from robot_formation.parameters import suggestion
 
 _TRIANGLE_LIST = 11
+_LOGGED = (names.DISPLACEMENT, names.RESIDUAL, names.COMMANDED)
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
 
 
@@ -71,6 +74,41 @@ def record_of(robots: Sequence[str], messages: Mapping[str, Sequence[Any]], deta
         left_plate=tuple(message.data for message in messages[_absolute(names.left_plate().name)]),
     )
     return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
+
+
+def load_displacements(path: str | Path, robot: str) -> DisplacementLog:
+    """Read a robot's displacements, residuals and commands, as its predictor got them: paired by their stamps.
+
+    Raises:
+        BagError: the bag is missing, no bag, empty or corrupted, or a topic has another message type than a run's.
+        AnalysisError: the bag has no displacements of this robot.
+    """
+    with read_bag(path) as bag:
+        topics = {f"/{robot}/{topic.name}": topic.type for topic in _LOGGED}
+        _require_displacements(bag, robot)
+        bag.require({topic: type_name for topic, type_name in topics.items() if topic in bag.topics})
+        messages: dict[str, list[Any]] = defaultdict(list)
+        for message in bag.messages(topics):
+            messages[message.topic].append(message.message)
+    by_stamp = [{entry.stamp_ns: entry.motion for entry in _stamped(messages[topic])} for topic in topics]
+    stamps = sorted(by_stamp[0])
+    columns = [
+        np.array([(found[stamp].u_m, found[stamp].v_m) if stamp in found else (math.nan, math.nan) for stamp in stamps])
+        for found in by_stamp
+    ]
+    return DisplacementLog(str(path), tuple(f"timestep {t}" for t in range(1, len(stamps) + 1)), *columns)
+
+
+def _require_displacements(bag: Bag, robot: str) -> None:
+    pattern = re.compile(rf"/([^/]+)/{names.DISPLACEMENT.name}")
+    robots = [match[1] for topic in bag.topics if (match := pattern.fullmatch(topic))]
+    if not robots:
+        raise AnalysisError(
+            f"{bag.path} has no displacements: no topic /{names.follower(1)}/{names.DISPLACEMENT.name}; give the bag "
+            "of 'formation run' or record that topic"
+        )
+    if robot not in robots:
+        raise AnalysisError(f"{bag.path} has no displacements of '{robot}'{suggestion(robot, robots)}")
 
 
 def _last_stamp_ns(messages: Mapping[str, Sequence[Any]]) -> int:
