@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,11 +22,37 @@ class PredictorComponent(Component):
 
     def __init__(self, parameters: PredictorParameters, place: Place) -> None:
         super().__init__(place)
-        self._predictor = Predictor(parameters)
+        self._state_file = Path(parameters.state_file) if parameters.state_file else None
+        self._predictor = self._restored(parameters)
         self._displacements: dict[int, Any] = {}
         self._residuals: dict[int, Any] = {}
         self._commanded: dict[int, Any] = {}
         self._first_commanded_ns: int | None = None
+
+    def _restored(self, parameters: PredictorParameters) -> Predictor:
+        """Begin anew, or where the state file says that an earlier one was."""
+        if not parameters.load_state:
+            return Predictor(parameters)
+        if self._state_file is None:
+            raise PredictionError("'load_state' needs the 'state_file' to load")
+        if not self._state_file.exists():
+            return Predictor(parameters)
+        try:
+            state = json.loads(self._state_file.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise PredictionError(f"{self._state_file}: can't read the predictor's state: {error}") from None
+        return Predictor.from_state(parameters, state)
+
+    def _save(self) -> None:
+        """Keep what was learned; a node that dies while writing leaves the last whole state."""
+        if self._state_file is None:
+            return
+        unfinished = self._state_file.with_name(self._state_file.name + ".partial")
+        try:
+            unfinished.write_text(json.dumps(self._predictor.state()), encoding="utf-8")
+            unfinished.replace(self._state_file)
+        except OSError as error:
+            self.warn(f"can't keep the predictor's state: {error}")
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
@@ -49,12 +77,13 @@ class PredictorComponent(Component):
         ):
             if array is not None:
                 values[name] = np.array2string(array, precision=6, separator=", ").replace("\n", "")
+        values.update(insight.notes or {})
         if insight.condition_number is not None:
             values["condition number"] = f"{insight.condition_number:.4g}"
         return values
 
     def actuation_bias(self) -> tuple[float, float]:
-        """By how much (u, v) the robot is expected to go farther than it is told, metres; zero if that isn't learned."""
+        """By how much (u, v) the robot is expected to go farther than told, metres; zero if that isn't learned."""
         if not self._predictor.observations:
             return (0.0, 0.0)
         forecast = self._predictor.predict()
@@ -102,6 +131,7 @@ class PredictorComponent(Component):
             self._send_prediction(Motion(), conversions.NO_ESTIMATE)
             return
         covariance = _TO_XY @ forecast.about_command @ _TO_XY.T
+        self._save()  # before the answer: whoever has it finds the state that goes with it
         u_m, v_m = forecast.command.tolist()
         self._send_prediction(Motion.from_uv(u_m, v_m), covariance.ravel().tolist())
 

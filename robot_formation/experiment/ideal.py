@@ -1,8 +1,8 @@
 """The noise floor of a run: the same controller, but its prediction moves are the ideal ones, by ground truth.
 
 What is left for the camera to correct then comes from the robot's own scatter and the camera's noise; no predictor can
-do better on average. `ideal` commands the ideal move itself, `ideal+close` takes off the actuation bias as the project's
-predictor has learned it in the same run.
+do better on average. `ideal` commands the ideal move itself, `ideal+close` takes off the actuation bias as the
+project's predictor has learned it in the same run.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from robot_formation.parameters import parameter
+from robot_formation.parameters import ParameterError, parameter
 
 CLOSABLE = ("previous", "ewma", "kalman_trend", "measured", "edmd")
 """Models that may run with residual closing and bias learning, as NAME+close."""
@@ -64,7 +64,11 @@ class EdmdParameters:
 
 @dataclass(frozen=True)
 class ClosingParameters:
-    """Closing of the camera's residual and learning of the actuation bias ('formation' and NAME+close)."""
+    """Closing of the camera's residual and learning of the actuation bias ('formation' and NAME+close).
+
+    Three lists, of equal length, describe a bank of filters from one that trusts in steadiness to one that follows
+    every change.
+    """
 
     residual_u_m: float = parameter(
         0.006, "Standard deviation of the camera's residual along u (side length)", unit="m", low=1e-6, high=1.0
@@ -85,7 +89,7 @@ class ClosingParameters:
         0.05, "Leader-induced displacement along v known beforehand", unit="m", low=-1.0, high=1.0
     )
     step_sigma_u_m: float = parameter(0.003, "Standard deviation of it along u", unit="m", low=1e-6, high=1.0)
-    step_sigma_v_m: float = parameter(0.003, "Standard deviation of it along v", unit="m", low=1e-6, high=1.0)
+    step_sigma_v_m: float = parameter(0.0025, "Standard deviation of it along v", unit="m", low=1e-6, high=1.0)
     noise_m: tuple[float, ...] = parameter(
         (0.0016, 0.0025, 0.005),
         "Filters: standard deviation of the leader-induced displacement about its level",
@@ -119,6 +123,14 @@ class ClosingParameters:
         noise_m=0.003, level_m=0.001, trend_m=0.0002, start_trend_m=0.0005, damping=0.9
     )
 
+    def __post_init__(self) -> None:
+        """Check that every filter has its three numbers."""
+        lengths = {len(self.noise_m), len(self.level_m), len(self.trend_m)}
+        if len(lengths) != 1 or not self.noise_m:
+            raise ParameterError(
+                "predictor: 'closing.noise_m', 'level_m' and 'trend_m' need one number for each filter"
+            )
+
 
 @dataclass(frozen=True)
 class FormationParameters:
@@ -147,12 +159,14 @@ class PredictorParameters:
     max_u_m: float = parameter(0.1, "Bound of the forecast along u", unit="m", low=0.0, high=10.0)
     max_v_m: float = parameter(0.2, "Bound of the forecast along v", unit="m", low=0.0, high=10.0)
     sigma_u_m: float = parameter(
-        0.005, "Standard deviation of a forecast along u before errors tell", unit="m", low=0.0, high=1.0
+        0.0045, "Standard deviation of a forecast along u before errors tell", unit="m", low=0.0, high=1.0
     )
     sigma_v_m: float = parameter(
-        0.003, "Standard deviation of a forecast along v before errors tell", unit="m", low=0.0, high=1.0
+        0.0025, "Standard deviation of a forecast along v before errors tell", unit="m", low=0.0, high=1.0
     )
     sigma_weight: float = parameter(2.0, "How many forecasts these standard deviations count for", low=0.01, high=1e6)
+    state_file: str = parameter("", "File that keeps what was learned, so that a restarted node goes on; empty: none")
+    load_state: bool = parameter(False, "Begin with what state_file holds, if it is there")
     ewma: EwmaParameters = EwmaParameters()
     kalman_trend: TrendParameters = TrendParameters()
     edmd: EdmdParameters = EdmdParameters()
