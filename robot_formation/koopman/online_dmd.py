@@ -139,18 +139,19 @@ class OnlineDMD(RecursiveFit):
         rho = self.forgetting
         px = p.dot(x)
         scale = rho + float(x.dot(px))
-        new = p - px[:, None] * px / scale  # symmetric to the last bit, if P is
+        column = px[:, None]  # products of a column and a row are faster than broadcasting
+        new = p - column.dot(column.T) / scale  # symmetric to the last bit, if P is
         if rho != 1.0:
             new /= rho
         trace = rho * self._trace + float(x.dot(x))
-        size = float(new.trace())
+        size: float = sum(new.diagonal().tolist())
         if not (size * trace <= RECURSION_CONDITION**2 and size <= LARGEST_P):
             eigenvalues, vectors = np.linalg.eigh(p)
             self._r = (vectors / np.sqrt(eigenvalues)).T
             self._z = self._r @ (self.k - self._k0).T
             self._kept, self._p = (self.dimension, self.dimension), None
             return False
-        self.k = self.k + innovation[:, None] * (px / scale)
+        self.k = self.k + innovation[:, None].dot(column.T / scale)
         self._p, self._trace = new, trace
         return True
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.koopman.predictors.models import Insight, Matrix, Model, TrendFilter, Vector
+from robot_formation.koopman.predictors.models import Insight, Matrix, Model, TrendFilter, Vector, array
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 
 # A move that ends farther from its command has met an obstacle or was never carried out.
@@ -50,6 +50,8 @@ class ResidualFilter:
         self._drift[:, 0, 1, 1] = np.square(p.level_m)
         self._drift[:, 0, 2, 2] = np.square(p.trend_m)
         self._losses: Matrix = np.zeros((count, 2))
+        self.weights: Matrix = self._weighted()
+        """Weight of each filter for each axis, (filters, axes)."""
 
     def observe(self, total: Vector, residual: Vector | None) -> None:
         """Take the total displacement (2,) of a timestep and the camera's residual (2,), None if it saw none."""
@@ -65,13 +67,12 @@ class ResidualFilter:
             covariances = covariances - gains[..., None] * covariances[..., :1, :]
             losses = (NU + 1.0) * np.log1p(innovations**2 / (NU * variances)) + np.log(variances)
             self._losses = self._p.discount * self._losses + losses
+            self.weights = self._weighted()
         self._means = means @ self._go.T
         covariances = self._go @ covariances @ self._go.T + self._drift
         self._covariances = (covariances + np.swapaxes(covariances, -1, -2)) / 2.0
 
-    @property
-    def weights(self) -> NDArray[np.float64]:
-        """Weight of each filter for each axis, (filters, axes)."""
+    def _weighted(self) -> Matrix:
         weights = np.exp(-0.5 * (self._losses - self._losses.min(axis=0)))
         return np.asarray(weights / weights.sum(axis=0))
 
@@ -95,9 +96,10 @@ class ResidualFilter:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Put back what `state` took."""
-        self._means = np.array(state["means"], dtype=float).reshape(self._means.shape)
-        self._covariances = np.array(state["covariances"], dtype=float).reshape(self._covariances.shape)
-        self._losses = np.array(state["losses"], dtype=float).reshape(self._losses.shape)
+        self._means = array(state["means"], *self._means.shape)
+        self._covariances = array(state["covariances"], *self._covariances.shape)
+        self._losses = array(state["losses"], *self._losses.shape)
+        self.weights = self._weighted()
 
 
 class Closing:

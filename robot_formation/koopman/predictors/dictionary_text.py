@@ -47,7 +47,7 @@ def _part(word: str) -> Dictionary:
         if colon:
             raise ParameterError(f"the dictionary '{name}' takes no number")
         return Constant(2) if name == "constant" else Identity(2, ("u", "v"))
-    if not number.isdigit() or not 1 <= int(number) <= _LARGEST[name]:
+    if not number.isdecimal() or not 1 <= int(number) <= _LARGEST[name]:
         raise ParameterError(f"the dictionary '{name}' takes a number from 1 to {_LARGEST[name]}, like '{name}:2'")
     count = int(number)
     if name == "monomials":

@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_formation.koopman.online_dmd import OnlineDMD
 from robot_formation.koopman.predictors.dictionary_text import dictionary_from_text
-from robot_formation.koopman.predictors.models import Insight, Matrix, Vector, optional, vector
+from robot_formation.koopman.predictors.models import Insight, Matrix, Vector, array, optional, vector
 from robot_formation.koopman.predictors.parameters import EdmdParameters, PredictorParameters
 from robot_formation.koopman.windowed_dmd import WindowedDMD
 
@@ -61,7 +61,7 @@ class Literal:
     def restore(self, state: Mapping[str, Any]) -> None:
         """See `Model`."""
         self._collected = [vector(x) for x in state["collected"]]
-        self._k = None if state["k"] is None else np.array(state["k"], dtype=float).reshape(2, 2)
+        self._k = None if state["k"] is None else array(state["k"], 2, 2)
         self._state = vector(state["state"])
 
 
@@ -88,7 +88,7 @@ class Measured:
     def forecast(self) -> Vector:
         """See `Model`."""
         assert self._last is not None  # by the protocol
-        return self._last if self._pairs < 2 else self._dmd.k @ self._last
+        return self._last if self._pairs < 2 else self._dmd.k.dot(self._last)
 
     def insight(self) -> Insight:
         """See `Model`."""
@@ -107,6 +107,7 @@ class Measured:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """See `Model`."""
+        _require_same_settings(self._dmd, state["dmd"])
         self._dmd = OnlineDMD.from_state(state["dmd"])
         self._pairs = int(state["pairs"])
         self._last = vector(state["last"]) if state["last"] is not None else None
@@ -166,11 +167,19 @@ class Edmd:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """See `Model`."""
-        dmd = type(self._dmd).from_state(state["dmd"])
+        _require_same_settings(self._dmd, state["dmd"])
+        self._dmd = type(self._dmd).from_state(state["dmd"])
         size = self._dictionary.size
-        if dmd.k.shape != (size, size):
-            raise ValueError("it was learned with another dictionary")
-        self._dmd = dmd
         self._history = [vector(x) for x in state["history"]]
         self._lifted = vector(state["lifted"], size) if state["lifted"] is not None else None
         self._innovation = vector(state["innovation"], size) if state["innovation"] is not None else None
+
+
+def _require_same_settings(fresh: OnlineDMD | WindowedDMD, state: Mapping[str, Any]) -> None:
+    """Refuse a fit that was made with other settings: it would go on with those.
+
+    Raises:
+        ValueError: if the settings differ.
+    """
+    if state["settings"] != fresh.state()["settings"]:
+        raise ValueError("it was learned with other parameters (dictionary, prior, window or forgetting)")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from robot_formation.koopman.predictors.dmd import Edmd
-from robot_formation.koopman.predictors.models import Insight, Matrix, Model, Previous, Vector
+from robot_formation.koopman.predictors.models import Insight, Matrix, Model, Previous, Vector, array
 from robot_formation.koopman.predictors.parameters import PredictorParameters
 
 
@@ -60,7 +60,7 @@ class Mixture:
         """See `Model`."""
         for name, model in self._models.items():
             model.restore(state["models"][name])
-        self._losses = np.array(state["losses"], dtype=float).reshape(2, 2)
+        self._losses = array(state["losses"], 2, 2)
         self._begun = bool(state["begun"])
 
     def _forecasts(self) -> Matrix:

@@ -135,8 +135,8 @@ class TrendFilter:
             self._covariance = np.diag([noise, self._p.start_trend_m**2])
         else:
             gain = self._covariance[:, 0] / (self._covariance[0, 0] + noise)
-            self._state = self._state + np.outer(gain, x - self._state[0])
-            self._covariance = self._covariance - np.outer(gain, self._covariance[0])
+            self._state = self._state + gain[:, None] * (x - self._state[0])
+            self._covariance = self._covariance - gain[:, None] * self._covariance[0]
         f = self._transition
         self._state = f @ self._state
         covariance = f @ self._covariance @ f.T + self._change
@@ -155,8 +155,8 @@ class TrendFilter:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Put back what `state` took."""
-        self._state = None if state["state"] is None else np.array(state["state"], dtype=float).reshape(2, 2)
-        self._covariance = np.array(state["covariance"], dtype=float).reshape(2, 2)
+        self._state = None if state["state"] is None else array(state["state"], 2, 2)
+        self._covariance = array(state["covariance"], 2, 2)
 
 
 class KalmanTrend:
@@ -192,9 +192,18 @@ def vector(values: Any, size: int = 2) -> Vector:
     Raises:
         ValueError: if it has another length, or is not finite.
     """
+    return array(values, size)
+
+
+def array(values: Any, *shape: int) -> NDArray[np.float64]:
+    """Read an array of this shape from a state.
+
+    Raises:
+        ValueError: if it has another shape, or is not finite.
+    """
     found = np.array(values, dtype=float)
-    if found.shape != (size,) or not np.isfinite(found).all():
-        raise ValueError(f"{size} finite numbers are expected")
+    if found.shape != shape or not np.isfinite(found).all():
+        raise ValueError(f"finite numbers of shape {shape} are expected")
     return found
 
 

@@ -5,13 +5,14 @@ State x_t = (u_t, v_t): the follower's measured total displacement of timestep t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from robot_formation.errors import FormationError
+from robot_formation.koopman.linear_algebra import KoopmanError
 from robot_formation.koopman.predictors.closing import Closing
 from robot_formation.koopman.predictors.dmd import Edmd, Literal, Measured
 from robot_formation.koopman.predictors.formation import Mixture
@@ -23,6 +24,7 @@ from robot_formation.koopman.predictors.models import (
     Model,
     Previous,
     Vector,
+    array,
     optional,
     vector,
 )
@@ -44,8 +46,7 @@ MODELS: dict[str, Callable[[PredictorParameters], Model]] = {
 }
 
 
-@dataclass(frozen=True)
-class Forecast:
+class Forecast(NamedTuple):
     """What a predictor says of the next timestep; (u, v) in metres.
 
     Attributes:
@@ -84,8 +85,11 @@ class Predictor:
             self._closing = Closing(parameters.closing, self._model, self._model.judge)
         elif name.endswith(CLOSE):
             self._closing = Closing(parameters.closing, self._model)
-        self._errors: Matrix = np.diag([parameters.sigma_u_m, parameters.sigma_v_m]) ** 2 * parameters.sigma_weight
+        # Plain numbers: NumPy's overhead on two of them would be most of a predictor's cost.
         self._weight = parameters.sigma_weight
+        self._uu = parameters.sigma_u_m**2 * self._weight
+        self._uv = 0.0
+        self._vv = parameters.sigma_v_m**2 * self._weight
         self._expected: Vector | None = None
         self.observations = 0
 
@@ -103,19 +107,29 @@ class Predictor:
             PredictionError: if a component is not finite or longer than ten times the bound.
         """
         x = self._checked("displacement", displacement)
-        x[np.abs(x) < _FINEST_M] = 0.0
         r = None if residual is None else self._checked("residual", residual)
         c = None if commanded is None else self._checked("commanded displacement", commanded)
-        if self._expected is not None:
-            error = (x if r is None else x + r) - self._expected
-            self._errors = self._errors + np.outer(error, error)
-            self._weight += 1.0
+        u, v = x.tolist()
+        if abs(u) < _FINEST_M:
+            x[0] = u = 0.0
+        if abs(v) < _FINEST_M:
+            x[1] = v = 0.0
         if self._closing is not None:
             self._closing.observe(x, r, c)
             mean = self._closing.forecast()
         else:
             self._model.observe(x)
             mean = self._model.forecast()
+        if self._expected is not None:
+            if r is not None:
+                residual_u, residual_v = r.tolist()
+                u, v = u + residual_u, v + residual_v
+            expected_u, expected_v = self._expected.tolist()
+            error_u, error_v = u - expected_u, v - expected_v
+            self._uu += error_u * error_u
+            self._uv += error_u * error_v
+            self._vv += error_v * error_v
+            self._weight += 1.0
         self.observations += 1
         self._expected = self._bounded(mean)
 
@@ -128,15 +142,17 @@ class Predictor:
         if self._expected is None:
             raise PredictionError("nothing to predict from: no displacement was observed yet")
         mean = self._expected.copy()
-        command = mean if self._closing is None else self._bounded(mean - self._closing.bias())
-        return Forecast(mean, self._errors / self._weight, command)
+        command = mean.copy() if self._closing is None else self._bounded(mean - self._closing.bias())
+        uv = self._uv / self._weight
+        covariance = np.array(((self._uu / self._weight, uv), (uv, self._vv / self._weight)))
+        return Forecast(mean, covariance, command)
 
     def state(self) -> dict[str, Any]:
         """Take all that it has learned, as numbers, lists, text and None (JSON)."""
         return {
             "name": self.name,
             "model": self._model.state() if self._closing is None else self._closing.state(),
-            "errors": self._errors.tolist(),
+            "errors": [[self._uu, self._uv], [self._uv, self._vv]],
             "weight": self._weight,
             "expected": optional(self._expected),
             "observations": self.observations,
@@ -154,11 +170,16 @@ class Predictor:
             if state["name"] != parameters.name:
                 raise ValueError(f"it is of '{state['name']}', not of '{parameters.name}'")
             (predictor._model if predictor._closing is None else predictor._closing).restore(state["model"])
-            predictor._errors = np.array(state["errors"], dtype=float).reshape(2, 2)
-            predictor._weight = float(state["weight"])
-            predictor._expected = None if state["expected"] is None else vector(state["expected"])
+            (predictor._uu, predictor._uv), (_, predictor._vv) = array(state["errors"], 2, 2).tolist()
+            predictor._weight = float(array(state["weight"]))
+            if predictor._weight <= 0.0:
+                raise ValueError("its weight is not positive")
+            if state["expected"] is not None:
+                predictor._expected = predictor._bounded(vector(state["expected"]))
             predictor.observations = int(state["observations"])
-        except (KeyError, TypeError, ValueError) as error:
+        except KeyError as error:
+            raise PredictionError(f"the stored state of the predictor has no {error}") from None
+        except (TypeError, ValueError, OverflowError, KoopmanError) as error:
             raise PredictionError(f"the stored state of the predictor can't be used: {error}") from None
         return predictor
 
@@ -169,15 +190,19 @@ class Predictor:
     def _checked(self, what: str, value: Vector) -> Vector:
         x = np.array(value, dtype=float)
         u, v = x.tolist()
-        if not np.isfinite(x).all():
+        if not (math.isfinite(u) and math.isfinite(v)):
             raise PredictionError(f"refused the {what} (u {u}, v {v}): not finite")
-        if (np.abs(x) > 10.0 * self._bound).any():
+        if abs(u) > 10.0 * self.parameters.max_u_m or abs(v) > 10.0 * self.parameters.max_v_m:
             raise PredictionError(f"refused the {what} (u {u}, v {v}) m: no robot goes so far in a timestep")
         return x
 
-    @property
-    def _bound(self) -> Vector:
-        return np.array([self.parameters.max_u_m, self.parameters.max_v_m])
-
     def _bounded(self, mean: Vector) -> Vector:
-        return np.clip(np.nan_to_num(mean, nan=0.0, posinf=np.inf, neginf=-np.inf), -self._bound, self._bound)
+        u, v = mean.tolist()
+        max_u_m, max_v_m = self.parameters.max_u_m, self.parameters.max_v_m
+        if abs(u) <= max_u_m and abs(v) <= max_v_m:
+            return mean
+        return np.array([_clipped(u, max_u_m), _clipped(v, max_v_m)])
+
+
+def _clipped(value: float, bound: float) -> float:
+    return 0.0 if math.isnan(value) else max(-bound, min(bound, value))
