@@ -8,7 +8,7 @@ percentile bootstrap intervals over seeds.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -69,8 +69,7 @@ def summarise(rows: Sequence[RunRow]) -> list[dict[str, Any]]:
         entry["lost"] = sum(row.lost for row in runs.values())
         entry["lost_rate"] = entry["lost"] / len(runs)
         for name in MEDIANS:
-            values = [getattr(row, name) for row in runs.values()]
-            entry[name] = median_with_interval([value for value in values if value is not None])
+            entry[name] = median_with_interval(_known(runs.values(), name))
         coverages = [row.prediction_coverage_90 for row in runs.values() if row.prediction_coverage_90 is not None]
         entry["prediction_coverage_90"] = float(np.mean(coverages)) if coverages else None
         baseline = groups.get((track, surface, BASELINE))
@@ -94,7 +93,8 @@ def median_with_interval(values: Sequence[float]) -> dict[str, float | None] | N
     data = np.sort(np.asarray(values, dtype=float))
     draws = np.random.default_rng(0).integers(0, len(data), size=(RESAMPLES, len(data)))
     medians = np.sort(_median(data[draws]))
-    low, high = medians[int(0.025 * RESAMPLES) - 1], medians[int(0.975 * RESAMPLES) - 1]
+    outside = round(0.025 * RESAMPLES) - 1  # as many resamples beyond either end
+    low, high = medians[outside], medians[RESAMPLES - 1 - outside]
     return {"median": _finite(_median(data[None, :])[0]), "low": _finite(low), "high": _finite(high)}
 
 
@@ -109,6 +109,12 @@ def _median(data: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def _known(runs: Iterable[RunRow], name: str) -> list[float]:
+    """Collect a quantity where it is known; that of a lost run, which is of fewer timesteps, is worse than any."""
+    values = [math.inf if row.lost else getattr(row, name) for row in runs]
+    return [value for value in values if value is not None]
 
 
 def _reductions(runs: dict[int, RunRow], baseline: dict[int, RunRow]) -> list[float]:

@@ -103,7 +103,7 @@ def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[Predictor
         FormationError: naming what is misspelt, out of range or of another node.
     """
     from robot_formation.experiment.scenario import Scenario, Setup, override
-    from robot_formation.koopman.predictors import MODELS, NAMES, PredictorParameters
+    from robot_formation.koopman.predictors import NAMES, PredictorParameters
     from robot_formation.parameters import from_mapping, suggestion
 
     for name in chosen:
@@ -118,7 +118,7 @@ def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[Predictor
     values = scenario.parameters("predictor")
     return [
         from_mapping(PredictorParameters, {**values, "name": name}, where="predictor")
-        for name in dict.fromkeys(chosen or MODELS)
+        for name in dict.fromkeys(chosen or NAMES)
     ]
 
 

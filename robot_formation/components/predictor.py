@@ -22,7 +22,8 @@ class PredictorComponent(Component):
 
     def __init__(self, parameters: PredictorParameters, place: Place) -> None:
         super().__init__(place)
-        self._state_file = Path(parameters.state_file) if parameters.state_file else None
+        state_file = parameters.state_file.replace("{robot}", place.robot)
+        self._state_file = Path(state_file) if state_file else None
         self._predictor = self._restored(parameters)
         self._displacements: dict[int, Any] = {}
         self._residuals: dict[int, Any] = {}
@@ -120,10 +121,13 @@ class PredictorComponent(Component):
         displacement = _uv(self._displacements.pop(stamp_ns))
         residual = _uv(self._residuals.pop(stamp_ns))
         commanded = _uv(self._commanded.pop(stamp_ns)) if expected else None
-        try:
-            self._predictor.observe(displacement, residual, commanded)
-        except PredictionError as error:
-            self.warn(str(error))
+        if displacement is None:
+            self.warn("a displacement without an estimate is left out")
+        else:
+            try:
+                self._predictor.observe(displacement, residual, commanded)
+            except PredictionError as error:
+                self.warn(str(error))
         try:
             forecast = self._predictor.predict()
         except PredictionError as error:

@@ -101,9 +101,8 @@ class Plan:
                 raise SweepError(f"a {kind} is given twice")
         if not self.seeds:
             raise SweepError("no seed is given; --seeds 0:200 is from 0 to 199")
-        fixed = ("predictor.name", "world.surface", "seed", "fine_tuner.mode", "world.camera.mode")
         for setting in self.settings:
-            if (key := setting.partition("=")[0]) in fixed[:3]:
+            if (key := setting.partition("=")[0]) in ("predictor.name", "world.surface", "seed"):
                 raise SweepError(f"--set {key}: a sweep sets it itself; use --predictors, --surfaces or --seeds")
         for track in self.tracks:
             for surface in self.surfaces:
@@ -133,7 +132,7 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
     """Carry out one run.
 
     Raises:
-        FormationError: if the scenario can't be run.
+        SweepError: if the scenario can't be run to an end; the text names the run.
     """
 
     def make_run(scenario: scenarios.Scenario, listen: Callable[[str, Any], None]) -> InProcessRun:
@@ -141,7 +140,11 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
             return IdealRun(scenario, listen, close=task.predictor == "ideal+close")
         return InProcessRun(scenario, listen=listen)
 
-    analysis = analyse(run_in_memory(build(task, settings), make_run))
+    try:
+        analysis = analyse(run_in_memory(build(task, settings), make_run))
+    except FormationError as error:
+        run = f"track {task.track}, surface {task.surface}, predictor {task.predictor}, seed {task.seed}"
+        raise SweepError(f"{run}: {error}") from None
     totals = analysis.followers[0].totals
     names = [field.name for field in fields(Row)][6:]
     return Row(
@@ -172,11 +175,13 @@ class Table:
         self.rows: dict[Task, Row] = {}
         if self._path.exists():
             self.rows = {row.task: row for row in read_rows(self._path)}
-        # Written anew, so that a half-written last line is gone.
-        with self._path.open("w", newline="", encoding="utf-8") as file:
+        # Written anew, so that a half-written last line is gone; put in place at once, so that no row ever is.
+        unfinished = self._path.with_suffix(".partial")
+        with unfinished.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow([field.name for field in fields(Row)])
             writer.writerows(_cells(row) for row in self.rows.values())
+        unfinished.replace(self._path)
 
     def add(self, row: Row) -> None:
         """Append a row; it is on disk when this returns."""
@@ -202,17 +207,21 @@ def read_rows(path: Path) -> Iterator[Row]:
         SweepError: if the file is no such table.
     """
     columns = {field.name: str(field.type) for field in fields(Row)}
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.DictReader(file)
-        if reader.fieldnames is None or list(reader.fieldnames) != list(columns):
-            raise SweepError(f"{path}: no table of a sweep's runs; choose another --out")
-        for line in reader:
-            if None in line.values() or None in line:
-                continue
-            try:
-                yield Row(**{name: _value(kind, line[name]) for name, kind in columns.items()})
-            except ValueError:
-                raise SweepError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = file.readlines()
+    except (OSError, ValueError) as error:
+        raise SweepError(f"{path}: can't read it: {error}") from None
+    # A number that was cut off is a number too: only a line with its end is whole.
+    reader = csv.reader(line for line in lines if line.endswith("\n"))
+    if next(reader, None) != list(columns):
+        raise SweepError(f"{path}: no table of a sweep's runs; choose another --out")
+    for cells in reader:
+        try:
+            pairs = zip(columns.items(), cells, strict=True)
+            yield Row(**{name: _value(kind, cell) for (name, kind), cell in pairs})
+        except ValueError:
+            raise SweepError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
 
 
 def remaining(plan: Plan, rows: Mapping[Task, Row]) -> list[Task]:

@@ -28,7 +28,7 @@ from robot_formation.koopman.predictors.models import (
     optional,
     vector,
 )
-from robot_formation.koopman.predictors.parameters import NAMES, PredictorParameters
+from robot_formation.koopman.predictors.parameters import CLOSABLE, NAMES, PredictorParameters
 from robot_formation.parameters import suggestion
 
 # Nothing moves or is measured so finely: what is less is rounding, and dividing by it makes no sense.
@@ -44,6 +44,18 @@ MODELS: dict[str, Callable[[PredictorParameters], Model]] = {
     "edmd": Edmd,
     "formation": Mixture,
 }
+
+DESCRIPTIONS: dict[str, str] = {
+    "previous": 'the paper\'s "without prediction": the previous displacement',
+    "ewma": "exponentially weighted moving average",
+    "kalman_trend": "Kalman filter of a level with a damped trend",
+    "measured": "online DMD with measured pairs: the paper's algorithm as it must be meant",
+    "edmd": "online EDMD with a dictionary of yours (predictor.edmd.dictionary) and a prior",
+    "literal": "the paper's Algorithm 1 as printed, which is blind after three displacements",
+    "formation": "the project's own: residual and actuation bias closed, persistence and EDMD weighted",
+    **{f"{name}{CLOSE}": f"{name}, with residual and actuation bias closed" for name in CLOSABLE},
+}
+"""What each of `NAMES` is, in a line."""
 
 
 class Forecast(NamedTuple):
