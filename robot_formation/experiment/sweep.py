@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import csv
 import json
+import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,6 +29,7 @@ from robot_formation.surface import SURFACES
 CONDITIONS = ("fine_tuner.mode=paper", "world.camera.mode=on_demand", "world.overhead.enabled=false")
 RUNS_NAME = "runs.csv"
 PLAN_NAME = "sweep.json"
+_GOES_ON = "the same command with the same --out goes on"
 
 
 class SweepError(FormationError):
@@ -235,32 +239,47 @@ def chosen(plan: Plan, rows: Mapping[Task, Row]) -> list[Row]:
 
 
 def carry_out(tasks: Iterable[Task], settings: Sequence[str], jobs: int) -> Iterator[Row]:
-    """Run tasks on this machine's cores by joblib; yield rows as they come."""
+    """Run tasks on this machine's cores by joblib; yield rows as they come.
+
+    Raises:
+        SweepError: if a run can't come to its end, or a worker process dies.
+    """
     from joblib import Parallel, delayed
 
     # One run in a worker at a time; a few wait, so that no worker idles.
     pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="3*n_jobs")
-    yield from pool(delayed(run_task)(task, settings) for task in tasks)
+    try:
+        yield from pool(delayed(run_task)(task, settings) for task in tasks)
+    except BrokenExecutor:
+        raise SweepError(f"a worker process died (too little memory for --jobs {jobs}?); {_GOES_ON}") from None
 
 
 def carry_out_by_dask(tasks: Iterable[Task], settings: Sequence[str], scheduler: str) -> Iterator[Row]:
     """Run tasks on a Dask cluster; yield rows as they come.
 
     Raises:
-        SweepError: if Dask isn't installed or the scheduler doesn't answer.
+        SweepError: if Dask isn't installed, the scheduler doesn't answer or goes away, or a run can't be done there.
     """
     try:
         from dask.distributed import Client, as_completed
     except ImportError:
         raise SweepError("--dask needs the package 'distributed'; pip install 'dask[distributed]'") from None
+    # What happens to the connection is told in a line here, not by a traceback in its log.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:
         raise SweepError(f"no Dask scheduler answers at {scheduler}: {str(error).splitlines()[0]}") from None
     with client:
-        futures = client.map(lambda task: run_task(task, settings), list(tasks), pure=False)
-        for _, row in as_completed(futures, with_results=True):
-            yield row
+        for future in as_completed(client.map(partial(run_task, settings=settings), list(tasks), pure=False)):
+            if future.cancelled():
+                raise SweepError(f"the Dask cluster at {scheduler} is gone; {_GOES_ON}")
+            problem = future.exception()
+            if isinstance(problem, FormationError):
+                raise problem
+            if problem is not None:
+                raise SweepError(f"a Dask worker can't do the runs: {type(problem).__name__}: {problem}; {_GOES_ON}")
+            yield future.result()
 
 
 def _cells(row: Row) -> list[Any]:

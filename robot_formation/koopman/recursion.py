@@ -150,7 +150,7 @@ def reading_state() -> Iterator[None]:
     """Turn what goes wrong while a stored state is read into one sentence.
 
     Raises:
-        KoopmanError: instead of KeyError, TypeError and ValueError.
+        KoopmanError: instead of the errors of Python.
     """
     try:
         yield
@@ -158,7 +158,7 @@ def reading_state() -> Iterator[None]:
         raise
     except KeyError as error:
         raise KoopmanError(f"the stored state has no {error}") from error
-    except (TypeError, ValueError) as error:
+    except (IndexError, OverflowError, TypeError, ValueError) as error:
         raise KoopmanError(f"the stored state is none of this kind of model: {error}") from error
 
 

@@ -194,7 +194,12 @@ class WindowedDMD(RecursiveFit):
             dmd._trace, dmd._prior_share = float(state["trace"]), float(state["prior_share"])
             dmd._since_refit = int(state["since_refit"])
             dmd._singular = as_vector(state["singular"], "'singular' of the stored state", len(state["singular"]))
-        if len(xs) != len(ys) or len(xs) > dmd.window or not 0.0 <= dmd._prior_share <= 1.0:
-            raise KoopmanError("'x', 'y' and 'prior_share' of the stored state don't fit each other or the window")
+        if (
+            len(xs) != len(ys)
+            or len(xs) > dmd.window
+            or not 0.0 <= dmd._prior_share <= 1.0
+            or not 0.0 <= dmd._trace < float("inf")
+        ):
+            raise KoopmanError("'x', 'y', 'prior_share' and 'trace' of the stored state don't fit each other")
         dmd._pairs.extend(islice(zip(xs, ys, strict=True), dmd.window))
         return dmd

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.koopman.predictors.models import Insight, Matrix, Model, TrendFilter, Vector, array
+from robot_formation.koopman.predictors.models import Insight, Matrix, Model, TrendFilter, Vector, array, covariance
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 
 # A move that ends farther from its command has met an obstacle or was never carried out.
@@ -97,7 +97,7 @@ class ResidualFilter:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Put back what `state` took."""
         self._means = array(state["means"], *self._means.shape)
-        self._covariances = array(state["covariances"], *self._covariances.shape)
+        self._covariances = covariance(state["covariances"], *self._covariances.shape)
         self._losses = array(state["losses"], *self._losses.shape)
         self.weights = self._weighted()
 

@@ -156,7 +156,7 @@ class TrendFilter:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Put back what `state` took."""
         self._state = None if state["state"] is None else array(state["state"], 2, 2)
-        self._covariance = array(state["covariance"], 2, 2)
+        self._covariance = covariance(state["covariance"], 2, 2)
 
 
 class KalmanTrend:
@@ -204,6 +204,20 @@ def array(values: Any, *shape: int) -> NDArray[np.float64]:
     found = np.array(values, dtype=float)
     if found.shape != shape or not np.isfinite(found).all():
         raise ValueError(f"finite numbers of shape {shape} are expected")
+    return found
+
+
+def covariance(values: Any, *shape: int) -> NDArray[np.float64]:
+    """Read covariance matrices of this shape (..., n, n) from a state.
+
+    Raises:
+        ValueError: if they have another shape, or are none.
+    """
+    found = array(values, *shape)
+    turned = np.swapaxes(found, -1, -2)
+    eigenvalues = np.linalg.eigvalsh(found)  # ascending
+    if not (found == turned).all() or not (eigenvalues[..., 0] >= -1e-9 * abs(eigenvalues[..., -1])).all():
+        raise ValueError("covariance matrices are expected")
     return found
 
 

@@ -25,6 +25,7 @@ from robot_formation.koopman.predictors.models import (
     Previous,
     Vector,
     array,
+    covariance,
     optional,
     vector,
 )
@@ -156,8 +157,7 @@ class Predictor:
         mean = self._expected.copy()
         command = mean.copy() if self._closing is None else self._bounded(mean - self._closing.bias())
         uv = self._uv / self._weight
-        covariance = np.array(((self._uu / self._weight, uv), (uv, self._vv / self._weight)))
-        return Forecast(mean, covariance, command)
+        return Forecast(mean, np.array(((self._uu / self._weight, uv), (uv, self._vv / self._weight))), command)
 
     def state(self) -> dict[str, Any]:
         """Take all that it has learned, as numbers, lists, text and None (JSON)."""
@@ -182,7 +182,7 @@ class Predictor:
             if state["name"] != parameters.name:
                 raise ValueError(f"it is of '{state['name']}', not of '{parameters.name}'")
             (predictor._model if predictor._closing is None else predictor._closing).restore(state["model"])
-            (predictor._uu, predictor._uv), (_, predictor._vv) = array(state["errors"], 2, 2).tolist()
+            (predictor._uu, predictor._uv), (_, predictor._vv) = covariance(state["errors"], 2, 2).tolist()
             predictor._weight = float(array(state["weight"]))
             if predictor._weight <= 0.0:
                 raise ValueError("its weight is not positive")
