@@ -28,7 +28,7 @@ def timesteps(count, seed=0):
     for t in range(count):
         x = np.array([0.01 * np.sin(t / 5.0), 0.05]) + rng.normal(0.0, (0.003, 0.002))
         r = None if rng.random() < 0.15 else rng.normal(0.0, (0.006, 0.003))
-        c = None if rng.random() < 0.15 else x + (-0.003, 0.002) + rng.normal(0.0, 0.001, 2)
+        c = None if rng.random() < 0.15 else x + np.array([-0.003, 0.002]) + rng.normal(0.0, 0.001, 2)
         found.append((x, r, c))
     return found
 

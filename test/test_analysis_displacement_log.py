@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from robot_formation.analysis.displacement_log import DisplacementLog, read_log, write_log
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.forecasts import CHI_SQUARE_90, error_statistics, forecast_log, inside_ellipse
-from robot_formation.koopman.predictors import MODELS, PredictorParameters
+from robot_formation.koopman.predictors import NAMES, PredictorParameters
 
 FULL = "u_m,v_m,residual_u_m,residual_v_m,commanded_u_m,commanded_v_m"
 
@@ -184,7 +184,7 @@ def test_measured_forecasts_by_the_least_squares_fit_of_all_pairs_before():
         np.testing.assert_allclose(forecasts.means_m[t], k @ x[t - 1], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_forecast_is_made_from_the_rows_before_it_only(name):
     x, r, c = wandering(10), wandering(10, 6) - [0.0, 0.05], wandering(10, 7)
     known = forecast_log(log_of(x, r, c), PredictorParameters(name=name))

@@ -13,7 +13,7 @@ from robot_formation.analysis.displacement_log import read_log
 from robot_formation.analysis.from_bag import load_displacements, load_run
 from robot_formation.bag.writer import BagWriter
 from robot_formation.cli.main import main
-from robot_formation.koopman.predictors import MODELS, Predictor, PredictorParameters
+from robot_formation.koopman.predictors import NAMES, Predictor, PredictorParameters
 
 ERRORS = ["n", "rmse_u", "rmse_v", "rmse", "median", "worst", "coverage_90"]
 STEPS = [
@@ -79,7 +79,7 @@ def test_json_holds_forecast_covariance_and_errors_of_each_predictor_and_nothing
     assert said.err == ""
     found = json.loads(said.out)
     assert list(found) == ["predictors"]
-    assert list(found["predictors"]) == list(MODELS)
+    assert list(found["predictors"]) == list(NAMES)
     for values in found["predictors"].values():
         assert list(values) == ["forecast", "covariance", "error_m"]
         assert values["forecast"][0] is None
@@ -93,7 +93,7 @@ def test_json_holds_forecast_covariance_and_errors_of_each_predictor_and_nothing
     assert list(tmp_path.iterdir()) == [log]
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_forecast_is_that_of_a_predictor_that_saw_the_rows_before(capsys, log, name):
     found = forecasts(capsys, log, "--predictor", name)[name]
     rows = read_log(log)
@@ -137,8 +137,8 @@ def test_the_table_and_a_picture_beside_the_log_are_made(capsys, log):
     lines = said.out.splitlines()
     assert lines[0].startswith(f"{log}: 12 timesteps")
     assert "ideal move" in lines[0]
-    rows = {line.split()[0]: line.split()[1:] for line in lines if line.split()[:1] and line.split()[0] in MODELS}
-    assert list(rows) == list(MODELS)
+    rows = {line.split()[0]: line.split()[1:] for line in lines if line.split()[:1] and line.split()[0] in NAMES}
+    assert list(rows) == list(NAMES)
     errors = forecasts(capsys, log)
     for name, cells in rows.items():
         assert cells[:2] == ["11", f"{errors[name]['error_m']['rmse_u'] * 1e3:.2f}"]
@@ -150,7 +150,7 @@ def test_the_table_and_a_picture_beside_the_log_are_made(capsys, log):
     assert pixels[..., :3].std() > 0.05
 
 
-@pytest.mark.parametrize("names", [["previous"], ["literal", "ewma"], list(MODELS)])
+@pytest.mark.parametrize("names", [["previous"], ["literal", "ewma"], list(NAMES)])
 def test_a_picture_goes_where_it_is_told(capsys, log, tmp_path, names):
     options = [word for name in names for word in ("--predictor", name)]
     for suffix in (".png", ".svg"):

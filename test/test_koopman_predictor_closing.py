@@ -116,8 +116,9 @@ def test_a_residual_that_is_unknown_now_and_then_is_carried_on_by_what_was_drive
     w = np.array([0.0, 0.05])
     for _ in range(30):
         tested.observe(w, np.zeros(2), None)
-    tested.observe(w - (0.0, 0.01), None, None)  # 1 cm short, unseen
-    assert tested.forecast() == pytest.approx(w + (0.0, 0.01), abs=1e-4)
+    missed = np.array([0.0, 0.01])
+    tested.observe(w - missed, None, None)  # nobody saw that it fell short
+    assert tested.forecast() == pytest.approx(w + missed, abs=1e-4)
 
 
 def test_moves_that_ended_far_from_their_command_teach_no_bias():

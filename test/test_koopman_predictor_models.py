@@ -1,5 +1,7 @@
 """Every model's forecasts against hand calculation, numpy's least squares and a textbook Kalman filter."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from koopman_helpers import batch
@@ -150,7 +152,7 @@ def test_edmd_is_the_batch_ridge_fit_towards_persistence(text, window, forgettin
     p = EdmdParameters(dictionary=text, prior=0.3, window=window, forgetting=forgetting)
     psi, rows = lifted(text, history, p.scale_m)
     k = batch(
-        list(zip(rows[:-1], rows[1:], strict=True)),
+        list(pairwise(rows)),
         forgetting=forgetting,
         prior_weight=0.3,
         prior_k=np.eye(psi.size),

@@ -42,7 +42,10 @@ class PredictorComponent(Component):
             state = json.loads(self._state_file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise PredictionError(f"{self._state_file}: can't read the predictor's state: {error}") from None
-        return Predictor.from_state(parameters, state)
+        try:
+            return Predictor.from_state(parameters, state)
+        except PredictionError as error:
+            raise PredictionError(f"{self._state_file}: {error}") from None
 
     def _save(self) -> None:
         """Keep what was learned; a node that dies while writing leaves the last whole state."""
