@@ -35,6 +35,7 @@ class IdealRun(InProcessRun):
     def __init__(self, scenario: Scenario, listen: Callable[[str, Any], None], *, close: bool) -> None:
         self._poses: dict[str, Pose] = {}
         self._predicting: set[str] = set()
+        self._changes: dict[str, Motion] = {}  # ideal minus predicted move of the timestep
         self._odometry = {absolute("", names.ground_truth_odom(robot).name): robot for robot in scenario.robots}
         world = from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world")
         self._face = TargetFace(Camera(world.make_surface(), world), world)
@@ -54,8 +55,11 @@ class IdealRun(InProcessRun):
             self._predicting.add(namespace)
         elif topic == names.MOVE and namespace in self._predicting:
             self._predicting.discard(namespace)
-            motion = self._ideal(namespace)
+            predicted, motion = conversions.read_move(message), self._ideal(namespace)
+            self._changes[namespace] = Motion(motion.x_m - predicted.x_m, motion.y_m - predicted.y_m)
             message = conversions.move(motion, message.header.frame_id, conversions.stamp_of(message))
+        elif topic == names.COMMANDED and namespace in self._changes:
+            message = _changed(message, self._changes.pop(namespace))
         super()._send(namespace, topic, message)
 
     def _ideal(self, namespace: str) -> Motion:
@@ -73,16 +77,21 @@ class IdealRun(InProcessRun):
 
 
 class TargetFace:
-    """What a noise-free camera would say of the neighbour's Target face."""
+    """What a noise-free camera would say of the neighbour's Target face.
+
+    The fine-tuner's side-length curve makes up for what the detector reports less than the true side, which its bias
+    alone does not. Here the side is the true one, so its distance is the pinhole's: focal length times edge over side.
+    """
 
     def __init__(self, camera: Camera, world: WorldParameters) -> None:
         half, top = world.marker.edge_m / 2.0, world.marker.top_m
         self._camera = camera
         self._centre_px = world.camera.centre_x_px
+        self._side_px_m = world.camera.focal_length_px * world.marker.edge_m
         self._corners = np.array([(x, -half, z) for x in (-half, half) for z in (top - 2.0 * half, top)])
 
     def offset(self, robot: Pose, neighbour: Pose, alignment: AlignmentParameters) -> tuple[float, float]:
-        """Way to the formation position as the fine-tuner reckons it, (x, y) in metres."""
+        """Way to the formation position as a calibrated fine-tuner reckons it, (x, y) in metres."""
         corners = self._corners @ neighbour.matrix().T + np.asarray(neighbour.position)
         pixels = self._camera.project(robot, corners)
         width, height = np.ptp(pixels, axis=0)
@@ -90,8 +99,18 @@ class TargetFace:
         side = max(float(width), float(height))
         return (
             (column - self._centre_px) / alignment.slope_px_per_m,
-            alignment.side_px_m / side - alignment.distance_m,
+            self._side_px_m / side - alignment.distance_m,
         )
+
+
+def _changed(commanded: Any, change: Motion) -> Any:
+    """Let the predictor know the move that was commanded in place of its own: the robot's bias is learned from it."""
+    if not conversions.has_estimate(commanded):
+        return commanded
+    motion = conversions.read_displacement(commanded)
+    changed = Motion(motion.x_m + change.x_m, motion.y_m + change.y_m)
+    stamp_ns = conversions.stamp_of(commanded)
+    return conversions.displacement(changed, commanded.header.frame_id, stamp_ns, (0.0,) * 4)
 
 
 def _pose(message: Any) -> Pose:
