@@ -20,6 +20,8 @@ from robot_formation.world.pose import Pose, pose_on_surface, quaternion
 
 TIMESTEPS = 8
 ALIGNMENT = AlignmentParameters()
+# The pinhole's own side-length curve, focal length times edge: with it, on level ground, offsets are true distances.
+PINHOLE = AlignmentParameters(side_px_m=273.7 * 0.06)
 
 
 def level(x_m, y_m, yaw_rad=0.0):
@@ -41,11 +43,14 @@ def face(world):
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.7, -2.5])
-def test_at_the_ideal_place_there_is_no_offset_wherever_the_pair_stands(face, yaw_rad):
+def test_at_the_ideal_place_there_is_no_offset_wherever_the_pair_stands(world, face, yaw_rad):
+    assert PINHOLE.side_px_m == world.camera.focal_length_px * world.marker.edge_m
     right = (0.32 * math.sin(yaw_rad), -0.32 * math.cos(yaw_rad))
     neighbour = level(0.8, 0.9, yaw_rad)
     robot = level(0.8 + right[0], 0.9 + right[1], yaw_rad)
-    assert face.offset(robot, neighbour, ALIGNMENT) == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert face.offset(robot, neighbour, PINHOLE) == pytest.approx((0.0, 0.0), abs=1e-12)
+    # The fine-tuner's curve is fitted to what the detector reports; on true sides it is a few millimetres off.
+    assert face.offset(robot, neighbour, ALIGNMENT) == pytest.approx((0.0, 0.0), abs=5e-3)
 
 
 @pytest.mark.parametrize("x_m", [-0.04, -0.01, 0.0, 0.02, 0.05])
@@ -56,7 +61,7 @@ def test_on_level_ground_the_offset_is_that_of_the_pinhole(world, face, x_m, y_m
     depth_m = -edge_m / 2.0 - (y_m + camera.y_m)
     # The camera looks left: the picture's right is the robot's front, and a neighbour's face ahead lies right.
     column_px = camera.focal_length_px * -(x_m + camera.x_m) / depth_m
-    found = face.offset(level(x_m, y_m), level(0.0, 0.0), ALIGNMENT)
+    found = face.offset(level(x_m, y_m), level(0.0, 0.0), PINHOLE)
     assert found[0] == pytest.approx(column_px / ALIGNMENT.slope_px_per_m, abs=1e-12)
     assert found[1] == pytest.approx(depth_m - ALIGNMENT.distance_m, abs=1e-12)
 
@@ -64,7 +69,7 @@ def test_on_level_ground_the_offset_is_that_of_the_pinhole(world, face, x_m, y_m
 def test_the_offset_points_from_the_robot_to_its_place(face):
     ahead, behind = (face.offset(level(x, -0.32), level(0.0, 0.0), ALIGNMENT)[0] for x in (0.02, -0.02))
     assert ahead < -0.015 < 0.015 < behind
-    far, near = (face.offset(level(0.0, y), level(0.0, 0.0), ALIGNMENT)[1] for y in (-0.36, -0.28))
+    far, near = (face.offset(level(0.0, y), level(0.0, 0.0), PINHOLE)[1] for y in (-0.36, -0.28))
     assert far == pytest.approx(0.04, abs=1e-12)
     assert near == pytest.approx(-0.04, abs=1e-12)
 
@@ -87,9 +92,8 @@ def test_on_a_bowl_too_the_offset_is_taken_from_all_corners_of_the_face(world, f
             columns.append(world.camera.focal_length_px * ray @ right / (ray @ ahead))
             rows.append(world.camera.focal_length_px * ray @ down / (ray @ ahead))
     side_px = max(np.ptp(columns), np.ptp(rows))
-    side_px_m = world.camera.focal_length_px * edge_m
     middle_px = (min(columns) + max(columns)) / 2.0
-    expected = (middle_px / ALIGNMENT.slope_px_per_m, side_px_m / side_px - ALIGNMENT.distance_m)
+    expected = (middle_px / ALIGNMENT.slope_px_per_m, ALIGNMENT.side_px_m / side_px - ALIGNMENT.distance_m)
     assert face.offset(robot, neighbour, ALIGNMENT) == pytest.approx(expected, abs=1e-12)
 
 

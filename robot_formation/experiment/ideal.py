@@ -77,21 +77,16 @@ class IdealRun(InProcessRun):
 
 
 class TargetFace:
-    """What a noise-free camera would say of the neighbour's Target face.
-
-    The fine-tuner's side-length curve makes up for what the detector reports less than the true side, which its bias
-    alone does not. Here the side is the true one, so its distance is the pinhole's: focal length times edge over side.
-    """
+    """What a noise-free camera would say of the neighbour's Target face."""
 
     def __init__(self, camera: Camera, world: WorldParameters) -> None:
         half, top = world.marker.edge_m / 2.0, world.marker.top_m
         self._camera = camera
         self._centre_px = world.camera.centre_x_px
-        self._side_px_m = world.camera.focal_length_px * world.marker.edge_m
         self._corners = np.array([(x, -half, z) for x in (-half, half) for z in (top - 2.0 * half, top)])
 
     def offset(self, robot: Pose, neighbour: Pose, alignment: AlignmentParameters) -> tuple[float, float]:
-        """Way to the formation position as a calibrated fine-tuner reckons it, (x, y) in metres."""
+        """Way to the formation position as the fine-tuner reckons it, (x, y) in metres."""
         corners = self._corners @ neighbour.matrix().T + np.asarray(neighbour.position)
         pixels = self._camera.project(robot, corners)
         width, height = np.ptp(pixels, axis=0)
@@ -99,7 +94,7 @@ class TargetFace:
         side = max(float(width), float(height))
         return (
             (column - self._centre_px) / alignment.slope_px_per_m,
-            self._side_px_m / side - alignment.distance_m,
+            alignment.side_px_m / side - alignment.distance_m,
         )
 
 
