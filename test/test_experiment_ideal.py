@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from robot_formation import conversions, names
+from robot_formation import conversions
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters
 from robot_formation.control.alignment import AlignmentParameters
-from robot_formation.control.motion import Motion
 from robot_formation.experiment.ideal import IdealRun, TargetFace
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import load_track, override, with_surface
@@ -173,25 +172,6 @@ def test_a_move_ends_where_the_face_would_show_no_offset(surface):
     assert checked == TIMESTEPS - 3
 
 
-def test_the_predictor_learns_the_bias_of_the_move_that_was_made_not_of_its_own(closed):
-    # What was commanded is the displacement less what the prediction move went too far.
-    moves, moved, expected = [], [], []
-    for topic, message in closed.messages:
-        if topic == "/follower_1/alignment" and message.data in ("collect", "predict"):
-            moves, moved = [], []
-        elif topic == "/follower_1/move":
-            moves.append(conversions.read_move(message))
-        elif topic == "/follower_1/moved":
-            moved.append(conversions.read_displacement(message))
-        elif topic == "/follower_1/displacement":
-            total = conversions.read_displacement(message)
-            error = Motion(moved[0].x_m - moves[0].x_m, moved[0].y_m - moves[0].y_m)
-            expected.append((total.x_m - error.x_m, total.y_m - error.y_m))
-    told = [conversions.read_displacement(message) for message in closed.of("/follower_1/commanded")]
-    assert len(told) == TIMESTEPS
-    np.testing.assert_allclose([(m.x_m, m.y_m) for m in told], expected, rtol=0, atol=1e-12)
-
-
 def test_the_actuation_bias_is_taken_off_the_closed_floors_moves(monkeypatch):
     def first_prediction_move(close):
         story = Story("seed=1000", "leader.timesteps=4", close=close)
@@ -200,13 +180,3 @@ def test_the_actuation_bias_is_taken_off_the_closed_floors_moves(monkeypatch):
     monkeypatch.setattr(PredictorComponent, "actuation_bias", lambda self: (0.004, -0.007))
     plain, close = first_prediction_move(False), first_prediction_move(True)
     assert (plain.u_m - close.u_m, plain.v_m - close.v_m) == pytest.approx((0.004, -0.007), abs=1e-12)
-
-
-def test_an_unseen_command_is_handed_on_as_it_is(closed):
-    unknown = conversions.displacement(Motion(), "base_link", 5, conversions.NO_ESTIMATE)
-    run = IdealRun(closed.scenario, lambda topic, message: None, close=True)
-    run._changes["/follower_1"] = Motion(0.1, 0.1)
-    run._send("/follower_1", names.COMMANDED, unknown)
-    assert run._queue[-1][2] is unknown
-    for hosted in run._hosted:
-        hosted.component.close()

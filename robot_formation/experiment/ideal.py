@@ -35,7 +35,6 @@ class IdealRun(InProcessRun):
     def __init__(self, scenario: Scenario, listen: Callable[[str, Any], None], *, close: bool) -> None:
         self._poses: dict[str, Pose] = {}
         self._predicting: set[str] = set()
-        self._changes: dict[str, Motion] = {}  # ideal minus predicted move of the timestep
         self._odometry = {absolute("", names.ground_truth_odom(robot).name): robot for robot in scenario.robots}
         world = from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world")
         self._face = TargetFace(Camera(world.make_surface(), world), world)
@@ -55,11 +54,8 @@ class IdealRun(InProcessRun):
             self._predicting.add(namespace)
         elif topic == names.MOVE and namespace in self._predicting:
             self._predicting.discard(namespace)
-            predicted, motion = conversions.read_move(message), self._ideal(namespace)
-            self._changes[namespace] = Motion(motion.x_m - predicted.x_m, motion.y_m - predicted.y_m)
+            motion = self._ideal(namespace)
             message = conversions.move(motion, message.header.frame_id, conversions.stamp_of(message))
-        elif topic == names.COMMANDED and namespace in self._changes:
-            message = _changed(message, self._changes.pop(namespace))
         super()._send(namespace, topic, message)
 
     def _ideal(self, namespace: str) -> Motion:
@@ -96,16 +92,6 @@ class TargetFace:
             (column - self._centre_px) / alignment.slope_px_per_m,
             alignment.side_px_m / side - alignment.distance_m,
         )
-
-
-def _changed(commanded: Any, change: Motion) -> Any:
-    """Let the predictor know the move that was commanded in place of its own: the robot's bias is learned from it."""
-    if not conversions.has_estimate(commanded):
-        return commanded
-    motion = conversions.read_displacement(commanded)
-    changed = Motion(motion.x_m + change.x_m, motion.y_m + change.y_m)
-    stamp_ns = conversions.stamp_of(commanded)
-    return conversions.displacement(changed, commanded.header.frame_id, stamp_ns, (0.0,) * 4)
 
 
 def _pose(message: Any) -> Pose:
