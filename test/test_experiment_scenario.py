@@ -20,7 +20,7 @@ from robot_formation.experiment.scenario import (
     track_names,
     with_surface,
 )
-from robot_formation.koopman.predictors import MODELS, PredictorParameters
+from robot_formation.koopman.predictors import NAMES, PredictorParameters
 from robot_formation.parameters import from_mapping, specs, to_mapping
 from robot_formation.surface import SURFACES
 
@@ -184,9 +184,9 @@ def test_a_file_says_only_what_differs_and_is_called_like_itself(write):
 
 
 def test_an_override_beats_the_file_which_beats_config_which_beats_the_code(write):
-    path = write("predictor:\n  forgetting: 0.9\n  sigma_m: 0.001\n")
+    path = write("predictor:\n  forgetting: 0.9\n  sigma_u_m: 0.001\n")
     found = override(load(path), ["predictor.forgetting=0.8"]).parameters("predictor")
-    assert (found["forgetting"], found["sigma_m"], found["max_u_m"]) == (0.8, 0.001, 0.1)
+    assert (found["forgetting"], found["sigma_u_m"], found["max_u_m"]) == (0.8, 0.001, 0.1)
     assert load(path).parameters("block_detector")["block_filtering"] == 40
     assert KINDS["block_detector"].parameter_class()().block_filtering == 3
 
@@ -223,9 +223,9 @@ def test_another_surface_comes_with_its_own_defaults(track_two, surface):
 
 
 def test_every_predictor_can_be_chosen(track_two):
-    for name in MODELS:
+    for name in NAMES:
         assert override(track_two, [f"predictor.name={name}"]).parameters("predictor")["name"] == name
-    assert set(specs(PredictorParameters)["name"].choices) == set(MODELS)
+    assert set(specs(PredictorParameters)["name"].choices) == set(NAMES)
 
 
 # --- what can be wrong ------------------------------------------------------------------------------------------------
