@@ -311,6 +311,6 @@ def test_a_full_disk_is_told_in_one_line(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with BagWriter(tmp_path / "run") as writer:
-        monkeypatch.setattr(writer._mcap, "flush", full)
+        monkeypatch.setattr(writer._file, "end_chunk", full)
         with pytest.raises(BagError, match="No space left on device; free space"):
             writer.end_chunk()
