@@ -97,7 +97,7 @@ def mcap_files(path: Path) -> list[Path]:
     """
     if not path.exists():
         raise BagError(f"{path} doesn't exist; give a bag's folder or an .mcap file")
-    files = sorted(path.glob("*.mcap"), key=_in_order) if path.is_dir() else [path]
+    files = sorted(path.glob("*.mcap"), key=in_order) if path.is_dir() else [path]
     if not files or files[0].suffix != ".mcap":
         raise BagError(f"{path} is not a bag; give a folder that 'ros2 bag' or this project wrote, or an .mcap file")
     return files
@@ -120,8 +120,8 @@ def is_being_written(path: Path) -> bool:
     return False
 
 
-def _in_order(path: Path) -> list[int | str]:
-    """Sort key by which run_10.mcap comes after run_9.mcap."""
+def in_order(path: Path) -> list[int | str]:
+    """Return a sort key by which run_10.mcap comes after run_9.mcap."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
 
 
