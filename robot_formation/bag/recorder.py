@@ -57,11 +57,6 @@ class Recorder:
         """Messages recorded so far, by topic."""
         return self._writer.message_counts
 
-    @property
-    def now_ns(self) -> int:
-        """The latest time seen in a message, nanoseconds."""
-        return self._now_ns
-
     def add_topic(
         self, name: str, type_name: str, qos: TopicQos | tuple[TopicQos, ...], *, embedded: Definition | None = None
     ) -> None:

@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from robot_formation import conversions, exit_codes, names
+from robot_formation import conversions, exit_codes
 from robot_formation.bag.definitions import definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.mcap_file import CHUNK_BYTES
@@ -27,7 +27,7 @@ from robot_formation.bag.recording_queue import QUEUE_BYTES, RecordingQueue
 from robot_formation.bag.selection import Selection
 from robot_formation.bag.writer import WriteOptions
 from robot_formation.nodes.executor import make_executor
-from robot_formation.nodes.host import qos_profile, run_node, stopped
+from robot_formation.nodes.host import run_node, stopped
 from robot_formation.nodes.parameters import HostParameters, declare
 from robot_formation.nodes.topic_qos import accepting, accepts, offered
 from robot_formation.parameters import ParameterError, parameter
@@ -147,9 +147,6 @@ class RecorderNode:
         self._messages = 0
         self._chunk_at = time.monotonic()
         self._tick_at: float | None = None
-        health = names.DIAGNOSTICS
-        kind = conversions.message_class(health.type)
-        self._health = node.create_publisher(kind, health.name, qos_profile(health.qos))
 
     def run(self, stop: Callable[[], bool] = stopped) -> RecordReport:
         """Record until `stop` says so; then take what is still on its way and close the bag.
@@ -213,7 +210,7 @@ class RecorderNode:
                 self._ignored.add(name)
                 continue
             infos = self._node.get_publishers_info_by_topic(name)
-            if any(info.node_name != self._node.get_name() for info in infos):
+            if infos:
                 self._subscribe(name, types, infos)
 
     def _subscribe(self, name: str, types: list[str], infos: list[TopicEndpointInfo]) -> None:
@@ -253,7 +250,7 @@ class RecorderNode:
         self._lost[topic] += info.total_count_change
 
     def _review(self) -> None:
-        """Tell what is lost, and whom the subscriptions made so far don't reach; publish the health."""
+        """Tell what is dropped, and which publishers the subscriptions made so far don't reach."""
         for name, profile in self._subscribed.items():
             for info in self._node.get_publishers_info_by_topic(name):
                 gid = tuple(info.endpoint_gid)
@@ -264,19 +261,6 @@ class RecorderNode:
         if dropped > self._told_dropped:
             self._warn(f"{dropped} messages dropped: the disk is too slow for 'queue_bytes'")
             self._told_dropped = dropped
-        lost = sum(self._lost.values())
-        values = {
-            "topics": str(len(self._subscribed)),
-            "messages": str(self._messages),
-            "waiting [B]": str(self._queue.waiting_bytes),
-            "dropped": str(dropped),
-            "lost": str(lost),
-        }
-        text = "messages are lost" if dropped or lost else "recording"
-        name = self._node.get_fully_qualified_name()
-        self._health.publish(
-            conversions.diagnostics(name, 1 if dropped or lost else 0, text, values, self._recorder.now_ns)
-        )
 
 
 class _Executable:

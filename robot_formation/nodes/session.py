@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import signal
 from collections.abc import Iterator
+from types import TracebackType
 from typing import Any
 
 import rclpy
@@ -55,3 +57,33 @@ def node_session(name: str, *, namespace: str = "", **options: Any) -> Iterator[
         del node, context
         gc.collect()
         tracing.remove_new()
+
+
+class Interrupts:
+    """Counts SIGINT, SIGTERM and SIGHUP, so that work ends in good order; the second one interrupts it. A context
+    manager; call it to ask whether one has come.
+    """
+
+    _NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __call__(self) -> bool:
+        return self._count > 0
+
+    def __enter__(self) -> Interrupts:
+        self._before = {number: signal.signal(number, self._take) for number in self._NUMBERS}
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _take(self, number: int, frame: Any) -> None:
+        self._count += 1
+        if self._count > 1:
+            raise KeyboardInterrupt
