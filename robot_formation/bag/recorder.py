@@ -78,7 +78,8 @@ class Recorder:
             stamp_ns = self._now_ns
         else:
             self._now_ns = max(self._now_ns, stamp_ns)
-        self._writer.write(topic, cdr, stamp_ns)
+        # A middleware delivers payloads in words of four bytes (DDSI-RTPS 2.3, section 9.4): so do all our bags.
+        self._writer.write(topic, cdr + bytes(-len(cdr) % 4), stamp_ns)
         self._transforms.take(topic, type_name, cdr, stamp_ns)
         if self._writer.open_bytes >= self._chunk_bytes:
             self.end_chunk()

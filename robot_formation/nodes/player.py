@@ -212,10 +212,13 @@ class PlayerNode:
         self._poll(time.monotonic())
         for message in self._excerpt.first(self._bag):
             self._send(message)
-        self._head.jump(self._excerpt.start_ns, time.monotonic())
         with Prefetch(self._excerpt.scheduled(self._bag)) as source:
-            while (found := source.next()) is not None and self._wait_until_due(found):
-                self._send(found)
+            message = source.next()
+            # The schedule begins when the bag's first messages have been read.
+            self._head.jump(self._excerpt.start_ns, time.monotonic())
+            while message is not None and self._wait_until_due(message):
+                self._send(message)
+                message = source.next()
         self._rounds += 0 if self._ended else 1
 
     def _wait_until_due(self, message: RawMessage) -> bool:

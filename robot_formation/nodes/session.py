@@ -71,6 +71,7 @@ class Interrupts:
         self._before: dict[signal.Signals, Any] = {}
 
     def __call__(self) -> bool:
+        """Tell whether a signal has come."""
         return self._count > 0
 
     def __enter__(self) -> Interrupts:
