@@ -17,6 +17,7 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment.scenario import node_defaults
 from robot_formation.nodes.parameters import HostParameters
+from robot_formation.nodes.player import PlayerParameters
 from robot_formation.nodes.recorder import RecorderParameters
 from robot_formation.parameters import Spec, specs
 
@@ -38,7 +39,7 @@ _TYPES: dict[Any, str] = {
 def parameter_classes() -> dict[str, type]:
     """List the parameter class of every page, by the page's name."""
     classes = {name: kind.parameter_class() for name, kind in KINDS.items()}
-    return {**classes, "recorder": RecorderParameters, COMMON: HostParameters}
+    return {**classes, "recorder": RecorderParameters, "player": PlayerParameters, COMMON: HostParameters}
 
 
 def table(name: str, parameters: type) -> str:

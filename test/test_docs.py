@@ -12,13 +12,12 @@ from robot_formation.cli.main import VERBS
 from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import load_track
-from robot_formation.nodes.recorder import RecorderParameters
 from robot_formation.parameters import from_mapping, specs
 
 ROOT = Path(__file__).parent.parent
 NODE_PAGES = ROOT / "docs" / "nodes"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md", *(ROOT / "docs").rglob("*.md")]
-NODES = [*KINDS, "recorder"]
+NODES = [*KINDS, "recorder", "player"]
 QOS = {
     "event": names.EVENT,
     "history": names.HISTORY,
@@ -100,7 +99,7 @@ def test_a_pages_parameter_table_is_up_to_date(name):
 
 @pytest.mark.parametrize("name", NODES)
 def test_every_parameter_of_a_node_is_on_its_page(name):
-    parameters = RecorderParameters if name == "recorder" else KINDS[name].parameter_class()
+    parameters = TABLES.parameter_classes()[name]
     page = (NODE_PAGES / f"{name}.md").read_text()
     assert [parameter for parameter in specs(parameters) if f"\n| `{parameter}` |" not in page] == []
 

@@ -39,7 +39,7 @@ def installed(tmp_path_factory):
 
 
 def test_each_node_and_the_command_become_executables(installed):
-    nodes = {"world", "drive", "leader", "block_detector", "predictor", "fine_tuner", "recorder"}
+    nodes = {"world", "drive", "leader", "block_detector", "predictor", "fine_tuner", "recorder", "player"}
     folder = installed / "lib" / "robot_formation"
     assert nodes | {"formation"} <= {file.name for file in folder.iterdir()}
     assert all(os.access(file, os.X_OK) for file in folder.iterdir())

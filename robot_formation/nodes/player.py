@@ -213,12 +213,12 @@ class PlayerNode:
         for message in self._excerpt.first(self._bag):
             self._send(message)
         with Prefetch(self._excerpt.scheduled(self._bag)) as source:
-            message = source.next()
+            found = source.next()
             # The schedule begins when the bag's first messages have been read.
             self._head.jump(self._excerpt.start_ns, time.monotonic())
-            while message is not None and self._wait_until_due(message):
-                self._send(message)
-                message = source.next()
+            while found is not None and self._wait_until_due(found):
+                self._send(found)
+                found = source.next()
         self._rounds += 0 if self._ended else 1
 
     def _wait_until_due(self, message: RawMessage) -> bool:

@@ -55,7 +55,7 @@ class RecorderParameters:
         "Regular expression of topics that are left out unless 'topics' names them, matched as a whole",
     )
     images: bool = parameter(
-        False, "Record pictures too, also those that 'topics' doesn't name: noisy frames are 126 MB per thousand"
+        False, "Record pictures too where 'topics' doesn't name them: noisy frames are 126 MB per thousand"
     )
     time: str = parameter(
         "simulated",
