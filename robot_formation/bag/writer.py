@@ -336,6 +336,7 @@ class BagWriter:
         text = f"{self.path}: can't write the bag: {error.strerror or error}; free space or choose another path"
         if hasattr(self, "_file"):
             self._file.abandon()
+        if hasattr(self, "_file") and self.partial_path.suffix == PARTIAL_SUFFIX:
             text += f" ('formation recover {self.partial_path}' saves what was written)"
         self._failure = BagError(text)
         return self._failure
