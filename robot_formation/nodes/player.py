@@ -177,12 +177,11 @@ class PlayerNode:
             with self._keyboard:
                 unheard = self._wait_for_subscribers()
                 began = time.monotonic()
+                self._head.jump(self._excerpt.start_ns, began)
                 self._head.pause(self._parameters.paused, began)
                 while not self._ended and (self._rounds == 0 or self._parameters.loop):
                     self._play()
-            for output in self._outputs.values():
-                if not self._stop():
-                    output.deliver(_LAST_S)
+            self._deliver()
             return self._report(time.monotonic() - began, unheard)
         finally:
             gc.unfreeze()
@@ -197,6 +196,13 @@ class PlayerNode:
         return PlayReport(
             sent, self._rounds, seconds, self._errors.summary_ms(), self._skipped, unheard, interrupted=self._stop()
         )
+
+    def _deliver(self) -> None:
+        """Wait until the subscribers have everything; those that are gone never say so."""
+        end = time.monotonic() + _LAST_S
+        for output in self._outputs.values():
+            if not self._stop():
+                output.deliver(max(0.0, end - time.monotonic()))
 
     def _wait_for_subscribers(self) -> tuple[str, ...]:
         """Wait until every topic has one; return the topics that have none when the time is up."""

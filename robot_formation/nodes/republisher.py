@@ -15,7 +15,6 @@ from robot_formation.bag.qos import TopicQos
 
 # What a best-effort publisher keeps: more than any burst of a bag needs.
 _BEST_EFFORT_DEPTH = 100
-_ACKNOWLEDGED_S = 0.1
 _DELIVERED_S = 5.0
 
 
@@ -39,7 +38,7 @@ def republishing(profiles: Sequence[TopicQos]) -> QoSProfile:
 
 
 class Republisher:
-    """Publishes raw messages on one topic; none is lost as long as the subscribers take them.
+    """Publishes raw messages on one topic, and waits where a topic that keeps all has no room for more.
 
     Args:
         node: where the publisher belongs; its remappings count.
@@ -71,16 +70,11 @@ class Republisher:
         Raises:
             BagError: a subscriber has taken no message for seconds.
         """
-        # One that keeps the last few would overwrite what is not delivered yet.
-        if self.latched and self._depth and self.sent and self.sent % self._depth == 0:
-            self.deliver(_ACKNOWLEDGED_S)
         deadline = time.monotonic() + _DELIVERED_S
         while True:
             try:
                 self._publisher.publish(cdr)
-            except Exception as error:
-                if type(error).__name__ != "RCLError":  # it has no public name
-                    raise
+            except RuntimeError as error:  # rclpy's own, for lack of room
                 if time.monotonic() > deadline:
                     topic = self._publisher.topic_name
                     raise BagError(f"{topic}: a subscriber takes no more messages; play at a lower rate") from error
