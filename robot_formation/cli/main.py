@@ -22,13 +22,14 @@ from robot_formation.cli import (
     play,
     record,
     recover,
+    replay,
     run,
     teach,
     test,
 )
 from robot_formation.errors import FormationError
 
-VERBS = (run, list_, analyze, record, play, info, recover, calibrate, teach, detect, doctor, test)
+VERBS = (run, list_, analyze, record, play, info, recover, replay, calibrate, teach, detect, doctor, test)
 
 EPILOG = """\
 exit codes: 0 done, 2 usage or bad input, 3 leader lost or plate left, 4 a node died, 130 interrupted
