@@ -145,12 +145,17 @@ def test_topics_are_chosen_discovered_late_and_those_that_never_come_are_told(la
     lab.until(lambda: all(publishers[name].get_subscription_count() for name in wanted))
     for publisher in publishers.values():
         publisher.publish(String(data=publisher.topic_name))
+    file = tmp_path / "bag.partial" / "bag_0.mcap"
+    lab.until(lambda: b"parameters of /stranger" in file.read_bytes())
     report = lab.end(recorder)
     assert report["topics"] == {"/named": 1, "/match/loose": 1, "/match/late": 2}
     assert report["unseen"] == ["/never"]
     with read_bag(tmp_path / "bag") as bag:
         said = [(message.topic, message.message.data) for message in bag.messages(["/match/late"])]
         assert said == [("/match/late", "before anybody listened"), ("/match/late", "/match/late")]
+        details = bag.metadata("robot_formation")
+        assert json.loads(details["parameters of /stranger"])["use_sim_time"] is False
+        assert "robot_formation" in json.loads(details["versions"])
         assert bag.contents[0].type_hash == STORE.hash_rihs01(STRING)
 
 

@@ -80,6 +80,7 @@ class McapFile:
     def write_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write a metadata record at this place."""
         self._mcap.add_metadata(name, dict(values))
+        self._stream.flush()
 
     def finish(self) -> None:
         """Write index and footer and close the file."""

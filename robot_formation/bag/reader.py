@@ -15,9 +15,9 @@ from rosbags.highlevel import AnyReader
 from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.metadata import TopicSummary
+from robot_formation.bag.place import PARTIAL_SUFFIX
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.recover import in_order, mcap_files, recover
-from robot_formation.bag.writer import PARTIAL_SUFFIX
 
 _STORAGES = (".mcap", ".db3")
 _END_MAGIC = b"\x89MCAP0\r\n"

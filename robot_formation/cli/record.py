@@ -64,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.all == bool(args.topics or args.regex):
         raise FormationError("say what to record: topics, --regex, or --all alone")
+    from robot_formation.bag.place import PathReservation, check_free
     from robot_formation.bag.selection import Selection
-    from robot_formation.bag.writer import PathReservation, check_free
 
     Selection(args.topics, args.regex, args.exclude or "")  # a bad expression is told before ROS is loaded
     path = (args.out or default_bag()).absolute()
@@ -97,7 +97,7 @@ def _record(args: argparse.Namespace, path: Path) -> RecordReport:
     texts = {"versions": json.dumps(versions()), "git_commit": git_commit()}
     parameters = _parameters(args, path, tuple(f"{key}={text}" for key, text in texts.items()))
     with Interrupts() as interrupts, node_session("recorder") as node:
-        recorder = RecorderNode(node, parameters, say=_say, warn=lambda text: _say(f"warning: {text}"))
+        recorder = RecorderNode(node, parameters, say=_say, warn=_warn, ask=True)
         _say(f"recording into {path}; Ctrl-C ends")
         return recorder.run(interrupts)
 
@@ -145,6 +145,10 @@ def _to_json(report: RecordReport) -> dict[str, Any]:
         "lost": dict(report.lost),
         "unseen": list(report.unseen),
     }
+
+
+def _warn(text: str) -> None:
+    _say(f"warning: {text}")
 
 
 def _say(text: str) -> None:

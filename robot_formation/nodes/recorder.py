@@ -28,6 +28,7 @@ from robot_formation.bag.selection import Selection
 from robot_formation.bag.writer import WriteOptions
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import run_node, stopped
+from robot_formation.nodes.parameter_snapshot import ParameterSnapshot
 from robot_formation.nodes.parameters import HostParameters, declare
 from robot_formation.nodes.topic_qos import accepting, accepts, offered
 from robot_formation.parameters import ParameterError, parameter
@@ -122,6 +123,7 @@ class RecorderNode:
         parameters: what is recorded and where.
         say: told of each topic that is recorded; by default nobody.
         warn: told what is not; by default the node's log.
+        ask: whether the parameters of all nodes are asked for and put into the bag's metadata.
     """
 
     def __init__(
@@ -130,6 +132,8 @@ class RecorderNode:
         parameters: RecorderParameters,
         say: Callable[[str], None] = lambda text: None,
         warn: Callable[[str], None] | None = None,
+        *,
+        ask: bool = False,
     ) -> None:
         if not parameters.path:
             raise ParameterError("recorder: say where the bag goes, with the parameter 'path'")
@@ -147,6 +151,7 @@ class RecorderNode:
         self._messages = 0
         self._chunk_at = time.monotonic()
         self._tick_at: float | None = None
+        self._snapshot = ParameterSnapshot(node, self._keep) if ask else None
 
     def run(self, stop: Callable[[], bool] = stopped) -> RecordReport:
         """Record until `stop` says so; then take what is still on its way and close the bag.
@@ -249,8 +254,13 @@ class RecorderNode:
     def _on_lost(self, topic: str, info: Any) -> None:
         self._lost[topic] += info.total_count_change
 
+    def _keep(self, key: str, text: str) -> None:
+        self._queue.call(partial(self._recorder.write_metadata, {key: text}))
+
     def _review(self) -> None:
         """Tell what is dropped, and which publishers the subscriptions made so far don't reach."""
+        if self._snapshot is not None:
+            self._snapshot.look()
         for name, profile in self._subscribed.items():
             for info in self._node.get_publishers_info_by_topic(name):
                 gid = tuple(info.endpoint_gid)
