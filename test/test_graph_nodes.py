@@ -22,6 +22,7 @@ from robot_formation.experiment.domain import DomainReservation
 from robot_formation.experiment.in_process import absolute
 from robot_formation.launching.environment import node_environment
 from robot_formation.nodes.host import qos_profile
+from robot_formation.paths import config_dir
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
 
@@ -120,6 +121,7 @@ def alone(name, namespace, *arguments, tmp_path):
     [
         ("world", "/", ["-p", "surfase:=bowl"], ["'surfase'", "'surface'"]),
         ("world", "/", ["-p", "surface:=bowel"], ["'bowel'", "'bowl'"]),
+        ("world", "/", ["--params-file", str(config_dir() / "world.yaml"), "-p", "surface:=bowel"], ["'bowel'"]),
         ("drive", "/leader", ["-p", "max_v_m:=-1.0"], ["max_v_m", "outside"]),
         ("drive", "/leader", ["-p", "max_v_m:=far"], ["max_v_m", "float"]),
         ("leader", "/leader", ["-p", "timesteps:=0"], ["timesteps", "outside"]),
@@ -128,6 +130,11 @@ def alone(name, namespace, *arguments, tmp_path):
         ("fine_tuner", "/follower_1", ["-p", "look.frame:=3"], ["'look.frame'", "'look.frames'"]),
         ("overhead_tracker", "/", ["-p", "calibration:=goud"], ["'goud'", "'good'"]),
         ("recorder", "/", [], ["path"]),
+        ("recorder", "/", ["--params-file", str(config_dir() / "recorder.yaml")], ["path"]),
+        ("recorder", "/", ["-p", "path:=bag", "-p", "regex:='*'"], ["'*'", "no regular expression"]),
+        ("recorder", "/", ["-p", "path:=bag", "-p", "metadata:=[seed]"], ["key=value", "'seed'"]),
+        ("player", "/", ["--params-file", str(config_dir() / "player.yaml")], ["'bag'"]),
+        ("player", "/", ["-p", "bag:=nowhere"], ["nowhere", "doesn't exist"]),
         ("drive", "/", [], ["namespace"]),
         ("fine_tuner", "/somebody", [], ["'somebody'", "follower_1"]),
         ("drive", "/leader", ["--params-file", "missing.yaml"], ["missing.yaml"]),

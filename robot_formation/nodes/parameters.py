@@ -106,7 +106,9 @@ def take_changes(node: Node, current: Any, take: Callable[[Any], None]) -> None:
 
 
 def _plain(spec: Spec, value: Any) -> Any:
-    """Undo what YAML and rcl make of numbers: 1 where 1.0 is meant, array('d') where a list is."""
+    """Undo what YAML and rcl make of values: 1 where 1.0 is meant, array('d') where a list is, nothing of [ ]."""
+    if value is None and isinstance(spec.default, tuple):
+        return []
     if hasattr(value, "tolist"):
         value = value.tolist()
     if spec.type is float and isinstance(value, int) and not isinstance(value, bool):
