@@ -165,9 +165,8 @@ def draw_view(folder):
     for ahead_m in (0.0, 0.12):
         looking = pose_on_surface(plane, 0.9 + ahead_m, 0.6, 0.0)
         seen = pose_on_surface(plane, 0.9, 0.6 + FORMATION_DISTANCE_M, 0.0)
-        light = Camera(plane, WORLD).light(looking, [seen])
         sensor = Sensor(WORLD.camera, SEED, "follower_1")
-        picture = sensor.expose(light, sensor.sigma(light))
+        picture = sensor.expose(sensor.develop(Camera(plane, WORLD).light(looking, [seen])), 0.0)
         parameters = from_mapping(
             DetectorParameters, {"signature_range": [5.0, 6.0, 6.0], "max_merge_dist": 4}, where="bench"
         )
@@ -178,8 +177,8 @@ def draw_view(folder):
             cv2.rectangle(large, (left, top), (left + 2 * block.width, top + 2 * block.height), (255, 255, 255), 2)
             text = f"{('', 'Target', 'Front', 'Rear')[block.signature]} {block.width} x {block.height}"
             # The faces touch: the Target's label goes above, the others' below.
-            origin = (left, top - 8 if block.signature == 1 else top + 2 * block.height + 18)
-            cv2.putText(large, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+            origin = (left, top - 8 if block.signature == 1 else top + 2 * block.height + 14)
+            cv2.putText(large, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0), 1, cv2.LINE_AA)
         pictures.append(large)
     gap = np.full((pictures[0].shape[0], 12, 3), 255, np.uint8)
     both = np.hstack([pictures[0], gap, pictures[1]])

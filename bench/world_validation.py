@@ -29,10 +29,11 @@ IDEAL = {
         "stop_wheel_m",
     )
 }
+RATE_HZ = 2
 WATCHED = {
     "sleep": False,
     "camera.mode": "on_demand",
-    "camera.frame_rate_hz": 1,
+    "camera.min_frames_per_second": RATE_HZ,
     "camera.width_px": 16,
     "camera.height_px": 16,
 }
@@ -95,7 +96,7 @@ def drift_mm(surface, x, y, heading, seconds, **values):
     """How far a robot without commands moves, millimetres."""
     world = make_world(surface, x, y, heading, **WATCHED, **values)
     start = world.ground_truth("robot")
-    world.request_frames("robot", seconds)
+    world.request_frames("robot", RATE_HZ * seconds)
     while world.advance():
         pass
     return 1000 * math.hypot(*displacement(world, start)[:2])

@@ -39,7 +39,7 @@ def complaint(capsys, *arguments):
         (("run", "--set", "predictor.forgetting=often"), ["forgetting", "float"]),
         (("run", "--set", "leader.timesteps"), ["KEY=VALUE"]),
         (("run", "--set", "sed=3"), ["'sed'", "'seed'"]),
-        (("run", "--set", "world.camera.frame_rate_hz=31"), ["frame_rate_hz", "240"]),
+        (("run", "--set", "world.camera.min_frames_per_second=31"), ["min_frames_per_second", "240"]),
         (("run", "--set", "world.surface_parameters=[depth=1]"), ["depth"]),
         (("run", "--seed", "-1"), ["seed"]),
         (("run", "--real-time-factor", "-1"), ["real_time_factor"]),

@@ -1,6 +1,7 @@
 """The block detector on messages: every good picture is answered in its frame and with its stamp."""
 
 import array
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from component_helpers import wired
 from vision_helpers import GREEN, GROUPS, RED, canvas
 
 from robot_formation import conversions, names
+from robot_formation.components.catalogue import KINDS
+from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.vision.block import Block
 from robot_formation.vision.signatures import SignatureError, save_signatures
 
@@ -32,6 +35,12 @@ def wire(signatures):
 def image(pixels, number):
     """The frame of this number at 30 frames per second."""
     return conversions.image(pixels, CAMERA, number * 33_333_333)
+
+
+def counted(wire):
+    """Pictures processed and dropped, as the diagnostics show them."""
+    values = wire.component.health().values
+    return values["frames"], values["dropped"]
 
 
 def blocks_in(sent):
@@ -68,23 +77,41 @@ def test_block_filtering_of_the_paper_shows_a_block_in_its_21st_picture(signatur
     assert seen == [False] * 20 + [True] * 2
 
 
-def cut_off():
+def changed(**values):
     message = image(SQUARE, 1)
-    message.data = array.array("B", message.data[:-1])
+    for name, value in values.items():
+        setattr(message, name, value)
     return message
 
 
-def colourless():
-    message = image(SQUARE, 1)
-    message.encoding = "mono8"
-    return message
+WHOLE = array.array("B", SQUARE.tobytes())
+BAD = {
+    "cut off": changed(data=WHOLE[:-1]),
+    "too long": changed(data=WHOLE + WHOLE[:3]),
+    "empty": changed(data=array.array("B")),
+    "no rows": changed(height=0),
+    "no columns": changed(width=0),
+    "nothing at all": changed(width=0, height=0, step=0, data=array.array("B")),
+    "rows shorter than their pixels": changed(step=947),
+    "larger than its data": changed(width=640, height=480, step=1920),
+    "more rows than 32 bits can count bytes of": changed(height=2**32 - 1, step=2**32 - 1),
+    "0 bytes in 32 bits": changed(height=2**16, step=2**16, data=array.array("B")),
+    "grey": changed(encoding="mono8"),
+    "with alpha": changed(encoding="rgba8"),
+    "16 bits": changed(encoding="rgb16"),
+    "Bayer": changed(encoding="bayer_bggr8"),
+    "no encoding": changed(encoding=""),
+    "strange encoding": changed(encoding="\u20ac" * 1000),
+}
 
 
-@pytest.mark.parametrize("bad", [cut_off(), colourless()], ids=["cut off", "colourless"])
+@pytest.mark.parametrize("bad", BAD.values(), ids=BAD)
 def test_a_bad_picture_is_dropped_counted_and_warned_of(wire, bad):
     assert wire.give(IMAGE, bad) == []
     assert len(wire.warnings) == 1
-    assert wire.component.details() == {"frames": "0", "dropped": "1"}
+    assert "\n" not in wire.warnings[0]
+    assert len(wire.warnings[0]) < 200
+    assert counted(wire) == ("0", "1")
     assert wire.component.stamp_ns == 0
     answers = [blocks_in(wire.give(IMAGE, image(SQUARE, n))) for n in (1, 2)]
     assert [len(found) for found in answers] == [0, 1]
@@ -95,7 +122,7 @@ def test_a_picture_that_is_not_later_than_the_one_before_is_dropped(wire, number
     wire.give(IMAGE, image(SQUARE, 5))
     assert wire.give(IMAGE, image(SQUARE, number)) == []
     assert len(wire.warnings) == 1
-    assert wire.component.details() == {"frames": "1", "dropped": "1"}
+    assert counted(wire) == ("1", "1")
     (found,) = blocks_in(wire.give(IMAGE, image(SQUARE, 6)))
     assert found.age == 0  # as if it had never come
 
@@ -109,6 +136,33 @@ def test_the_other_order_of_colours_gives_the_same_blocks(wire, signatures):
     found = blocks_in(wire.give(IMAGE, image(SQUARE, 2)))
     assert len(found) == 1
     assert blocks_in(other.give(IMAGE, swapped)) == found
+
+
+def test_a_refused_encoding_is_named_with_what_to_send_instead(wire):
+    wire.give(IMAGE, BAD["grey"])
+    health = wire.component.health()
+    assert health.level == 1
+    assert health.text == "image encoding 'mono8' has no colour to find blocks by; send rgb8 or bgr8"
+
+
+@pytest.mark.parametrize("padding", [1, 4, 76])
+def test_padded_rows_give_the_same_blocks(wire, padding):
+    rows = np.full((208, 948 + padding), 196, np.uint8)  # the padding looks like the taught red
+    rows[:, :948] = SQUARE.reshape(208, 948)
+    for number in (1, 2):
+        message = image(SQUARE, number)
+        message.step = 948 + padding
+        message.data = array.array("B", rows.tobytes())
+        found = blocks_in(wire.give(IMAGE, message))
+    assert (found[0].x, found[0].y, found[0].width, found[0].height) == pytest.approx((158, 84, 48, 48), abs=4)
+    assert len(found) == 1
+    assert wire.warnings == []
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5000), (5000, 1), (2, 3), (1040, 1580)])
+def test_pictures_of_any_size_are_answered(wire, shape):
+    assert blocks_in(wire.give(IMAGE, image(np.zeros((*shape, 3), np.uint8), 1))) == []
+    assert counted(wire) == ("1", "0")
 
 
 @pytest.mark.parametrize("encoding", ["rgb8", "bgr8"])
@@ -160,3 +214,67 @@ def test_a_missing_signatures_file_is_said_in_one_line(tmp_path):
     with pytest.raises(SignatureError, match=r"missing\.yaml") as caught:
         wired("block_detector", "follower_1", signatures_file=str(tmp_path / "missing.yaml"))
     assert "\n" not in str(caught.value)
+
+
+def test_the_frame_rate_is_that_of_the_stamps_whatever_the_pauses_between_bursts(wire):
+    assert wire.component.details()["frame_rate_hz"] == ""
+    for number in (0, 1, 2, 3, 100, 101, 102, 103):
+        wire.give(IMAGE, image(EMPTY, number))
+    assert wire.component.details()["frame_rate_hz"] == "30.0"
+
+
+def test_the_processing_time_is_measured_by_the_hosts_clock(wire):
+    times = iter([10.0, 10.002, 20.0, 20.004, 30.0])
+    wire.component.wall_clock = lambda: next(times)
+    for message in (image(EMPTY, 1), image(EMPTY, 2), BAD["cut off"]):
+        wire.give(IMAGE, message)
+    details = wire.component.details()
+    assert (details["processing_mean_ms"], details["processing_worst_ms"]) == ("3.000", "4.000")
+
+
+def test_without_a_clock_there_is_no_processing_time(wire):
+    wire.give(IMAGE, image(EMPTY, 1))
+    assert wire.component.details()["processing_mean_ms"] == wire.component.details()["processing_worst_ms"] == ""
+
+
+def changed_parameters(wire, signatures, **values):
+    """Set parameters of a running detector as its host does."""
+    kind = KINDS["block_detector"].parameter_class()
+    values = {"signatures_file": signatures, "block_filtering": 0, **values}
+    wire.component.set_parameters(from_mapping(kind, values, where="block_detector"))
+
+
+def test_changed_parameters_count_from_the_next_picture_on_and_blocks_keep_their_index(wire, signatures):
+    assert wire.component.settable
+    wire.give(IMAGE, image(SQUARE, 1))
+    (before,) = blocks_in(wire.give(IMAGE, image(SQUARE, 2)))
+    changed_parameters(wire, signatures, min_block_area=100)
+    (after,) = blocks_in(wire.give(IMAGE, image(SQUARE, 3)))
+    assert (after.index, after.age) == (before.index, before.age + 1)
+    changed_parameters(wire, signatures, min_block_area=2500)
+    assert blocks_in(wire.give(IMAGE, image(SQUARE, 4))) == []
+
+
+def test_another_file_of_signatures_is_read_and_a_wrong_one_refused_without_effect(wire, signatures, tmp_path):
+    save_signatures(tmp_path / "green.yaml", [GROUPS["G1"][1]])
+    with pytest.raises(SignatureError, match=r"missing\.yaml"):
+        changed_parameters(wire, str(tmp_path / "missing.yaml"), min_block_area=2500)
+    wire.give(IMAGE, image(SQUARE, 1))
+    assert len(blocks_in(wire.give(IMAGE, image(SQUARE, 2)))) == 1
+    changed_parameters(wire, str(tmp_path / "green.yaml"))
+    assert blocks_in(wire.give(IMAGE, image(SQUARE, 3))) == []
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"min_block_area": 3}, "'min_block_area' is 3, outside 4 to 2500 cells"),
+        ({"signature_range": [5.0, 26.0]}, "'signature_range' is 26.0, outside 0.0 to 25.0"),
+        ({"signature_range": [1.0] * 8}, "give at most 7"),
+        ({"color_code_mode": 4}, "'color_code_mode' can't be 4"),
+        ({"block_filtering": 2.5}, "must be of type int"),
+    ],
+)
+def test_a_parameter_out_of_range_is_refused_with_its_range(wire, signatures, values, words):
+    with pytest.raises(ParameterError, match=re.escape(words)):
+        changed_parameters(wire, signatures, **values)

@@ -67,7 +67,11 @@ def test_package_xml_names_each_dependency_once_by_a_rosdep_like_key(package_xml
 def test_package_xml_names_every_ros_package_that_is_imported(package_xml):
     keys = {element.text for element in package_xml if element.tag in ("depend", "exec_depend")}
     imported = set()
-    for file in [*NODES.glob("*.py"), ROOT / "robot_formation" / "conversions.py", *(ROOT / "launch").glob("*.py")]:
+    for file in [
+        *NODES.glob("*.py"),
+        *(ROOT / "robot_formation" / "conversions").glob("*.py"),
+        *(ROOT / "launch").glob("*.py"),
+    ]:
         imported.update(
             re.findall(
                 r"^\s*(?:from|import) (\w+_msgs|\w+_srvs|\w+_interfaces|rclpy|launch\w*)",

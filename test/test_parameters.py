@@ -147,7 +147,7 @@ def test_parameter_objects_do_not_change():
 def test_checks_of_the_class_itself_are_reached():
     world = KINDS["world"].parameter_class()
     with pytest.raises(ParameterError, match="must divide physics_hz = 240"):
-        from_mapping(world, {"camera": {"frame_rate_hz": 50}}, where="test")
+        from_mapping(world, {"camera": {"min_frames_per_second": 50}}, where="test")
 
 
 def test_without_any_name_there_is_no_suggestion():

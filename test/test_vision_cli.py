@@ -6,12 +6,16 @@ import json
 import cv2
 import numpy as np
 import pytest
+import yaml
 from vision_helpers import DATA, EXAMPLES, GROUPS, PARAMETERS, canvas, picture
 
 from robot_formation.cli import detect, teach
 from robot_formation.errors import FormationError
-from robot_formation.parameters import to_mapping
+from robot_formation.parameters import specs, to_mapping
+from robot_formation.vision.files import CAMERA_PARAMETERS, read_parameters
+from robot_formation.vision.parameters import DetectorParameters
 from robot_formation.vision.signatures import load_signatures, save_signatures
+from robot_formation.world.parameters import CameraParameters
 
 
 def formation(*words):
@@ -115,9 +119,109 @@ def test_a_missing_or_broken_image_is_refused_in_one_line(files, content, messag
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("extension", [".png", ".jpg", ".webp", ".bmp", ".tiff"])
+def test_damaged_images_are_read_or_refused_with_a_line_of_ours_and_nothing_of_the_image_libraries(
+    files, capfd, extension
+):
+    encoded = cv2.imencode(extension, picture("seqA_20.webp"))[1].ravel()
+    signatures = files / "signatures.yaml"
+    refused, damaged = [], 0
+    rng = np.random.default_rng(5)
+    for share in np.linspace(0.05, 0.95, 10):
+        content = encoded[: int(share * len(encoded))].copy() if share < 0.5 else encoded.copy()
+        content[rng.integers(0, len(content), 8)] ^= 16
+        path = files / f"damaged{extension}"
+        path.write_bytes(content.tobytes())
+        try:
+            formation("detect", path, "--signatures", signatures, "--json")
+        except FormationError as error:
+            refused.append(str(error))
+        lines = capfd.readouterr().err.splitlines()
+        assert all(line.startswith(f"{path}: ") for line in lines)
+        damaged += any("damaged, used as far as it can be read" in line for line in lines)
+    assert all("\n" not in text for text in refused)
+    assert refused or damaged or extension == ".bmp"  # which has nothing that could tell
+
+
+PIXYMON = {
+    "Signature 1 range": 5.0,
+    "Signature 3 range": 6.0,
+    "Min brightness": 0.15,
+    "Camera brightness": 100,
+    "Block filtering": 40,
+    "Max merge dist": 4,
+    "Min block area": 20,
+    "Signature teach threshold": 5600,
+    "LED brightness": 4960,
+    "Max blocks": 50,
+    "Max blocks per signature": 10,
+    "Max tracking velocity": 80,
+    "Color code mode": 2,
+    "Auto Exposure Correction": 1,
+    "Auto White Balance": 0,
+    "Auto White Balance on power-up": 1,
+    "Flicker avoidance": 0,
+    "Min frames per second": 30,
+}
+
+
+def test_all_parameters_are_known_by_their_pixymon_names_and_those_of_the_camera_are_said_to_have_no_effect(tmp_path):
+    (tmp_path / "pixymon.json").write_text(json.dumps(PIXYMON))
+    said = []
+    read = read_parameters(tmp_path / "pixymon.json", said.append)
+    assert read == DetectorParameters(
+        signature_range=(5.0, 3.5, 6.0, 3.5, 3.5, 3.5, 3.5),
+        min_brightness=0.15,
+        block_filtering=40,
+        max_merge_dist=4,
+        min_block_area=20,
+        signature_teach_threshold=5600,
+        max_blocks=50,
+        max_blocks_per_signature=10,
+        max_tracking_velocity=80,
+        color_code_mode=2,
+        led_brightness=4960,
+    )
+    (line,) = said
+    assert all(name in line for name in CAMERA_PARAMETERS)
+    assert "no effect on a picture that is taken already" in line
+
+
+def test_the_cameras_parameters_are_those_of_the_worlds_camera():
+    assert set(specs(CameraParameters)) >= CAMERA_PARAMETERS
+
+
+def test_every_pixymon_name_begins_a_parameters_description():
+    known = {**specs(DetectorParameters), **{name: specs(CameraParameters)[name] for name in CAMERA_PARAMETERS}}
+    described = {spec.description.split(":")[0] for spec in known.values()}
+    assert described == {"Signature 1 range to Signature 7 range", *PIXYMON} - {
+        "Signature 1 range",
+        "Signature 3 range",
+    }
+
+
+def test_one_file_of_parameters_serves_teach_and_detect(files, capsys):
+    (files / "pixymon.yaml").write_text(yaml.safe_dump(PIXYMON))
+    words = ("--parameters", files / "pixymon.yaml", "--json")
+    image = DATA / "G1_teach_region.webp"
+    assert formation("teach", image, "--point", "158,104", *words) == 0
+    assert formation("detect", image, "--signatures", files / "signatures.yaml", *words) == 0
+    assert capsys.readouterr().err.count("camera_brightness") == 2
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ("Signature 8 range: 1.0", "no parameter 'signature_8_range'"),
+        ("Signature 1 range: wide", "must be of type float"),
+        ("Signature 1 range: 30", "outside 0.0 to 25.0"),
+        ("{Signature 1 range: 1, signature_range: [1]}", "either 'signature_range' or"),
+        ("{Min brightness: 0.1, min_brightness: 0.2}", "'min_brightness' is given twice"),
+        ("LED brightness: 20001", "outside 0 to 20000 uA"),
+        ("'': 1", "no parameter ''"),
+        ("min_block_area: &a {b: *a}", "holds a value that can't be used"),
+        (f"min_block_area: 0x{'f' * 5000}", "holds a value that can't be used"),
+        ("min_block_area: {a: 1}", "no parameter 'min_block_area.a'"),
         ("[1, 2]", "holds no parameters"),
         ("1: 2", "holds no parameters"),
         ("speed: 3", "no parameter 'speed'"),

@@ -137,6 +137,8 @@ GOOD = "{sig: 1, uMin: 1, uMax: 3, uMean: 2, vMin: 1, vMax: 3, vMean: 2}"
         (f"signatures: [{GOOD[:-1]}, type: 4}}]", "type 4"),
         (f"signatures: [{GOOD[:-1]}, rgb: -1}}]", "rgb -1"),
         (f"signatures: [{GOOD.replace('uMin: 1', 'uMin: 99999999999')}]", "32 bits"),
+        (f"signatures: [{GOOD.replace('uMin: 1', 'uMin: 0x' + 'f' * 5000)}]", "32 bits"),
+        (f"signatures: [{GOOD.replace('sig: 1', 'sig: 0x' + 'f' * 5000)}]", "holds a number that can't be used"),
         (f"signatures: [{GOOD}, {GOOD}]", "twice"),
         ("signatures: [", "neither YAML nor JSON"),
         ("a: !!python/name:os.system", "neither YAML nor JSON"),

@@ -7,6 +7,7 @@ from world_helpers import of_kind, parameters, run, world
 
 from robot_formation.surface import make_surface
 from robot_formation.world import Camera, Frame, Sensor, WorldParameters, marker_picture, pose_on_surface
+from robot_formation.world.scene import FULL
 
 PLANE = make_surface("plane")
 BOWL = make_surface("bowl")
@@ -39,7 +40,7 @@ def test_the_target_face_appears_where_a_pinhole_puts_its_corners(surface, ahead
     seen = pose_on_surface(surface, 0.9 + ahead, 0.4 + aside, 0.0)
     corners = CORNERS @ seen.matrix().T + np.array(seen.position)
     pixels = camera.project(looking, corners)
-    left, right, top, bottom = box_of(redness(camera.view(looking, [seen])))
+    left, right, top, bottom = box_of(redness(camera.light(looking, [seen])))
     # Target's picture spans its corners; on the bowl both robots lean alike up to a few degrees.
     assert left == pytest.approx(pixels[:, 0].min(), abs=1.0)
     assert right == pytest.approx(pixels[:, 0].max(), abs=1.0)
@@ -65,54 +66,43 @@ def test_each_face_has_its_colour(face, channel):
 def test_forward_of_the_looking_robot_is_right_in_its_picture():
     camera = Camera(PLANE, WorldParameters())
     looking = pose_on_surface(PLANE, 0.9, 0.4, 0.0)
-    left, right, _, _ = box_of(redness(camera.view(looking, [pose_on_surface(PLANE, 0.95, 0.72, 0.0)])))
+    left, right, _, _ = box_of(redness(camera.light(looking, [pose_on_surface(PLANE, 0.95, 0.72, 0.0)])))
     assert 0.5 * (left + right) > 180
 
 
 def test_the_front_face_shows_when_the_seen_robot_is_behind():
     camera = Camera(PLANE, WorldParameters())
-    picture = camera.view(pose_on_surface(PLANE, 0.9, 0.4, 0.0), [pose_on_surface(PLANE, 0.75, 0.75, 0.0)])
+    picture = camera.light(pose_on_surface(PLANE, 0.9, 0.4, 0.0), [pose_on_surface(PLANE, 0.75, 0.75, 0.0)])
     green = picture[..., 1].astype(int) - picture[..., 0]
-    assert np.count_nonzero(green > 40) > 50
+    assert np.count_nonzero(green > 0.2 * FULL) > 50
 
 
 def test_a_nearer_robot_hides_a_farther_one_in_whatever_order_they_are_given():
     camera = Camera(PLANE, WorldParameters())
     looking = pose_on_surface(PLANE, 0.9, 0.4, 0.0)
     near, far = (pose_on_surface(PLANE, 0.9, 0.4 + distance, 0.0) for distance in (0.32, 0.64))
-    alone, both = camera.view(looking, [near]), camera.view(looking, [near, far])
+    alone, both = camera.light(looking, [near]), camera.light(looking, [near, far])
     left, right, top, bottom = (round(edge) for edge in box_of(redness(alone)))
     face = (slice(top + 2, bottom - 1), slice(left + 2, right - 1))
     assert np.array_equal(alone[face], both[face])
-    assert np.array_equal(both, camera.view(looking, [far, near]))
+    assert np.array_equal(both, camera.light(looking, [far, near]))
 
 
 @pytest.mark.parametrize("aside", [-0.4, 0.1, 0.15, 0.2])
 def test_robots_behind_or_across_the_near_plane_draw_without_error(aside):
     camera = Camera(BOWL, WorldParameters())
     looking = pose_on_surface(BOWL, 0.9, 0.9, 0.0)
-    picture = camera.view(looking, [pose_on_surface(BOWL, 0.9, 0.9 + aside, 0.4)])
+    picture = camera.light(looking, [pose_on_surface(BOWL, 0.9, 0.9 + aside, 0.4)])
     assert picture.shape == (208, 316, 3)
     if aside < 0:
-        assert np.array_equal(picture, camera.view(looking, []))
+        assert np.array_equal(picture, camera.light(looking, []))
 
 
-def test_the_grey_background_has_the_level_of_the_exposure():
-    background = marker_picture(parameters(camera={"background_level": 100.0}))[5:25, 5:60]
-    assert background.mean() == pytest.approx(100.0, abs=1.0)
-
-
-def test_noise_has_the_data_sheets_size_and_differs_per_frame():
-    settings = WorldParameters().camera
-    sensor = Sensor(settings, 3, "follower_1")
-    flat = np.full((208, 316, 3), 100.0, np.float32)
-    first, second = (sensor.expose(flat, sensor.sigma(flat)).astype(float) for _ in range(2))
-    light = (100 / 255) ** 1.5
-    expected = 255 / 1.5 * light ** (1 / 1.5 - 1) * math.sqrt(2.0e-4 * light + 2.9e-4**2)
-    rounding = 1 / 12
-    assert first.std() == pytest.approx(math.sqrt(expected**2 + rounding), rel=0.03)
-    assert not np.array_equal(first, second)
-    assert np.corrcoef(first.ravel(), second.ravel())[0, 1] == pytest.approx(0.0, abs=0.02)
+def test_light_is_the_reflectance_of_what_is_fully_lit_and_knows_no_exposure():
+    for brightness, lux in ((100, 500.0), (20, 10.0)):
+        settings = parameters(camera={"wall_albedo": 64, "camera_brightness": brightness, "illuminance_lux": lux})
+        light = Camera(PLANE, settings).light(pose_on_surface(PLANE, 0.9, 0.4, 0.0), [])
+        assert light[5:25].mean() == pytest.approx(64 / 255 * FULL, abs=1.0)
 
 
 def test_a_standing_scene_keeps_its_picture_and_changes_its_noise():
@@ -120,11 +110,12 @@ def test_a_standing_scene_keeps_its_picture_and_changes_its_noise():
     a_world.request_frames("follower_1", 40)
     frames = np.array([event.image for event in of_kind(run(a_world), Frame)], float)
     assert not np.array_equal(frames[0], frames[1])
-    noiseless = Camera(PLANE, a_world.parameters).view(
-        a_world.ground_truth("follower_1").pose, [a_world.ground_truth("leader").pose]
-    )
-    largest_sigma, rounding = 3.0, 0.5
-    assert np.abs(frames.mean(axis=0) - noiseless).max() < 6.0 * largest_sigma / math.sqrt(40) + rounding
+    sees = [a_world.ground_truth("leader").pose]
+    light = Camera(PLANE, a_world.parameters).light(a_world.ground_truth("follower_1").pose, sees)
+    development = Sensor(a_world.parameters.camera, 1, "follower_1").develop(light)
+    rounding = 0.5
+    largest = 6.0 * development.sigma.max() / math.sqrt(40) + rounding
+    assert np.abs(frames.mean(axis=0) - development.picture).max() < largest
 
 
 def test_noise_depends_only_on_seed_robot_and_number_of_frames_drawn():
@@ -145,7 +136,7 @@ def test_a_render_of_another_make_sees_the_same_target_face():
     camera = Camera(BOWL, settings)
     looking = pose_on_surface(BOWL, 0.9, 0.3, 0.2)
     seen = pose_on_surface(BOWL, 0.88, 0.64, 0.15)
-    ours = box_of(redness(camera.view(looking, [seen])))
+    ours = box_of(redness(camera.light(looking, [seen])))
     theirs = box_of(redness(tiny_renderer_picture(camera, looking, seen)))
     assert ours == pytest.approx(theirs, abs=1.5)
 

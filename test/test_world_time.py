@@ -116,8 +116,8 @@ def test_setups_that_cannot_be_are_refused():
         world(robots=(PAIR[0], PAIR[0]))
     with pytest.raises(WorldError, match="lockstep"):
         world(lockstep=["follower_2"])
-    with pytest.raises(ParameterError, match=r"camera.frame_rate_hz.*must divide physics_hz"):
-        parameters(camera={"frame_rate_hz": 50})
+    with pytest.raises(ParameterError, match=r"camera.min_frames_per_second.*must divide physics_hz"):
+        parameters(camera={"min_frames_per_second": 50})
 
 
 def drive_both(a_world, follower_angles):

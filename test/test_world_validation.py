@@ -15,8 +15,12 @@ ALONE = (RobotStart("leader", 0.89, 0.89, 0.3, camera=False),)
 RADIUS, ARM = 0.030, 0.110 + 0.095
 MOVES = [(0.2, 0, 0), (-0.2, 0, 0), (0, 0.1, 0), (0, -0.1, 0), (0.1, 0.1, 0), (0.1, -0.1, 0), (0, 0, 0.6), (0, 0, -0.6)]
 DRIVE_MODES = ["pid", "pwm_stop"]
-# A clock for worlds in which nobody moves: frames that cost nothing, one per second.
-WATCHED = {"sleep": False, "camera": {"mode": "on_demand", "frame_rate_hz": 1, "width_px": 16, "height_px": 16}}
+# A clock for worlds in which nobody moves: frames that cost nothing.
+RATE_HZ = 2
+WATCHED = {
+    "sleep": False,
+    "camera": {"mode": "on_demand", "min_frames_per_second": RATE_HZ, "width_px": 16, "height_px": 16},
+}
 
 
 def wheel_angles(v_x, v_y, turn):
@@ -89,8 +93,8 @@ def moved_after(seconds, surface, start, **values):
     """How far and by what angle a robot without commands has moved: metres, radians."""
     a_world = World(surface, [start], parameters(**{**WATCHED, **IDEAL, **values}), seed=1)
     before = a_world.ground_truth(start.name)
-    for _ in range(0, seconds, 600):
-        a_world.request_frames(start.name, seconds)
+    for _ in range(0, seconds, 300):
+        a_world.request_frames(start.name, RATE_HZ * seconds)
         run(a_world)
     assert a_world.stamp_ns == seconds * 10**9
     forward, left, turn = displacement(a_world, start.name, before)
@@ -171,7 +175,7 @@ def test_a_sliding_robot_loses_energy_all_the_time():
     plane = make_surface("inclined_plane", {"slope_deg": 14.0, "direction_deg": 90.0})
     values = parameters(**WATCHED, **IDEAL, traction={"friction": 0.2})
     a_world = World(plane, [RobotStart("leader", 0.89, 1.6, 0.5 * math.pi)], values, seed=1)
-    a_world.request_frames("leader", 2)
+    a_world.request_frames("leader", 2 * RATE_HZ)
     energies = []
     while a_world.owes:
         a_world.step()

@@ -29,7 +29,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--signatures", metavar="FILE", type=Path, required=True, help="taught signatures, YAML or JSON"
     )
-    parser.add_argument("--parameters", metavar="FILE", type=Path, help="detector parameters, YAML or JSON")
+    parser.add_argument(
+        "--parameters", metavar="FILE", type=Path, help="parameters by our names or PixyMon's, YAML or JSON"
+    )
     parser.add_argument("--sequence", action="store_true", help="the images are successive frames")
     parser.add_argument(
         "--dt-us",
@@ -58,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from robot_formation.vision.parameters import DetectorParameters
     from robot_formation.vision.signatures import load_signatures
 
-    parameters = read_parameters(args.parameters) if args.parameters else DetectorParameters()
+    parameters = read_parameters(args.parameters, _warn) if args.parameters else DetectorParameters()
     if not args.sequence:
         parameters = dataclasses.replace(parameters, block_filtering=0)
     detector = BlockDetector(load_signatures(args.signatures), parameters)

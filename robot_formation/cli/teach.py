@@ -24,7 +24,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--signature", metavar="N", type=int, choices=range(1, 8), default=1, help="number, 1 to 7 (default: 1)"
     )
-    parser.add_argument("--parameters", metavar="FILE", type=Path, help="detector parameters, YAML or JSON")
+    parser.add_argument(
+        "--parameters", metavar="FILE", type=Path, help="parameters by our names or PixyMon's, YAML or JSON"
+    )
     parser.add_argument("--out", metavar="FILE", type=Path, help="file of signatures to write into, YAML or .json")
     parser.add_argument("--json", action="store_true", help="print the taught signature as JSON and nothing else")
     parser.set_defaults(run=run)
@@ -43,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     from robot_formation.vision.parameters import DetectorParameters
     from robot_formation.vision.signatures import load_signatures, save_signatures, teach_point, teach_region
 
-    parameters = read_parameters(args.parameters) if args.parameters else DetectorParameters()
+    parameters = read_parameters(args.parameters, _warn) if args.parameters else DetectorParameters()
     kept = load_signatures(args.out) if args.out and args.out.exists() else []
     picture = read_picture(args.image, _warn)
     if args.region:

@@ -48,7 +48,8 @@ class Component:
     """Base of all components. The host calls `attach` once, then `start`, then the inputs' handlers in order.
 
     A component that has finished sets `exit_code`; its host then ends with it. `settable` components take changed
-    parameters after the start.
+    parameters after the start. A host that reports health gives a `wall_clock` (seconds, from any origin), to measure
+    how long work takes and for nothing else.
     """
 
     settable = False
@@ -58,6 +59,7 @@ class Component:
         self.exit_code: int | None = None
         self.exit_reason = ""
         self.stamp_ns = 0
+        self.wall_clock: Callable[[], float] | None = None
         self._send: Callable[[Topic, Any], None] = _not_attached
         self._say: Callable[[int, str], None] = lambda level, text: None
         self._warnings = 0

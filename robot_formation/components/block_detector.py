@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
+import statistics
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.parameters import parameter
 from robot_formation.paths import config_dir
+from robot_formation.vision.block import Block
 from robot_formation.vision.detector import BlockDetector
 from robot_formation.vision.parameters import DetectorParameters
-from robot_formation.vision.signatures import load_signatures
+from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, scaled
+from robot_formation.vision.signatures import Signature, load_signatures
 from robot_formation.vision.tracking import ClockError
 
-WIDTH_PX, HEIGHT_PX = 316, 208
+_RATE_FRAMES = 31
+_WHITE = (255, 255, 255)
 
 
 @dataclass(frozen=True)
@@ -29,18 +34,32 @@ class BlockDetectorNodeParameters(DetectorParameters):
         "", "YAML or JSON file of taught signatures; empty: config/signatures.yaml, taught under the world's light"
     )
 
+    def load(self) -> list[Signature]:
+        """Read the taught signatures.
+
+        Raises:
+            SignatureError: if the file can't be read or holds no signatures.
+        """
+        return load_signatures(Path(self.signatures_file) if self.signatures_file else config_dir() / "signatures.yaml")
+
 
 class BlockDetectorComponent(Component):
     """Answers each picture with its blocks, in the picture's frame and with its stamp."""
 
+    settable = True
+
     def __init__(self, parameters: BlockDetectorNodeParameters, place: Place) -> None:
         super().__init__(place)
-        path = Path(parameters.signatures_file) if parameters.signatures_file else config_dir() / "signatures.yaml"
-        self._detector = BlockDetector(load_signatures(path), parameters)
+        self._file = parameters.signatures_file
+        self._detector = BlockDetector(parameters.load(), parameters)
         self._frames = 0
         self._dropped = 0
         self._scaled = False
         self._image_wanted = False
+        self._stamps: deque[int] = deque(maxlen=_RATE_FRAMES)
+        self._timed = 0
+        self._total_s = 0.0
+        self._worst_s = 0.0
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
@@ -50,6 +69,16 @@ class BlockDetectorComponent(Component):
         """See `Component`."""
         return [names.BLOCKS, names.BLOCKS_IMAGE]
 
+    def set_parameters(self, parameters: BlockDetectorNodeParameters) -> None:
+        """See `Component`: tracked blocks are kept; a changed file of signatures is read.
+
+        Raises:
+            SignatureError: if that file can't be used; nothing is changed then.
+        """
+        changed = parameters.signatures_file != self._file
+        self._detector.configure(parameters.load() if changed else self._detector.signatures, parameters)
+        self._file = parameters.signatures_file
+
     def listened_to(self, topic: names.Topic, listeners: int) -> None:
         """See `Component`: the annotated picture is drawn only while somebody listens."""
         if topic == names.BLOCKS_IMAGE:
@@ -57,39 +86,55 @@ class BlockDetectorComponent(Component):
 
     def details(self) -> dict[str, str]:
         """See `Component`."""
-        return {"frames": str(self._frames), "dropped": str(self._dropped)}
+        periods = [later - earlier for earlier, later in itertools.pairwise(self._stamps)]
+        return {
+            "frames": str(self._frames),
+            "dropped": str(self._dropped),
+            "frame_rate_hz": f"{1e9 / statistics.median(periods):.1f}" if periods else "",
+            "processing_mean_ms": f"{1e3 * self._total_s / self._timed:.3f}" if self._timed else "",
+            "processing_worst_ms": f"{1e3 * self._worst_s:.3f}" if self._timed else "",
+        }
 
     def _on_image(self, message: Any) -> None:
+        clock = self.wall_clock
+        began = clock() if clock else 0.0
         try:
-            pixels = conversions.read_image(message)
-        except conversions.MessageError as error:
-            self._dropped += 1
-            self.warn(str(error))
-            return
-        if pixels.shape[:2] != (HEIGHT_PX, WIDTH_PX):
-            if not self._scaled:
-                self._scaled = True
-                self.warn(f"pictures of {pixels.shape[1]} x {pixels.shape[0]} are scaled to {WIDTH_PX} x {HEIGHT_PX}")
-            pixels = np.asarray(cv2.resize(pixels, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        stamp_ns = conversions.stamp_of(message)
-        try:
+            pixels = self._picture(message)
+            stamp_ns = conversions.stamp_of(message)
             blocks = self._detector.process(pixels, stamp_ns // 1000)
-        except ClockError as error:
+        except (conversions.MessageError, ClockError) as error:
             self._dropped += 1
             self.warn(str(error))
             return
         self._frames += 1
+        self._stamps.append(stamp_ns)
         self.stamp_ns = stamp_ns
         frame = message.header.frame_id
-        self._send(names.BLOCKS, conversions.blocks(blocks, frame, self.stamp_ns))
+        self._send(names.BLOCKS, conversions.blocks(blocks, frame, stamp_ns))
         if self._image_wanted:
-            picture = pixels.copy()
-            for block in blocks:
-                corner = (block.x - block.width // 2, block.y - block.height // 2)
-                opposite = (block.x + block.width // 2, block.y + block.height // 2)
-                cv2.rectangle(picture, corner, opposite, (255, 255, 255), 1)
-                label = f"{block.signature}:{block.index}"
-                cv2.putText(
-                    picture, label, (corner[0], corner[1] - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1
-                )
-            self._send(names.BLOCKS_IMAGE, conversions.image(picture, frame, self.stamp_ns))
+            self._send(names.BLOCKS_IMAGE, conversions.image(_annotated(pixels, blocks), frame, stamp_ns))
+        if clock:
+            took_s = clock() - began
+            self._timed += 1
+            self._total_s += took_s
+            self._worst_s = max(self._worst_s, took_s)
+
+    def _picture(self, message: Any) -> Picture:
+        pixels: Picture = conversions.read_image(message)
+        height, width = pixels.shape[:2]
+        if (width, height) != (WIDTH, HEIGHT) and not self._scaled:
+            self._scaled = True
+            self.warn(f"pictures of {width} x {height} are scaled to {WIDTH} x {HEIGHT}")
+        return scaled(pixels)
+
+
+def _annotated(picture: Picture, blocks: list[Block]) -> Picture:
+    """A copy of the picture with the blocks' boxes, each with its signature and index."""
+    drawn: Picture = picture.copy()
+    for block in blocks:
+        corner = (block.x - block.width // 2, block.y - block.height // 2)
+        opposite = (block.x + block.width // 2, block.y + block.height // 2)
+        cv2.rectangle(drawn, corner, opposite, _WHITE, 1)
+        label = f"{block.signature}:{block.index}"
+        cv2.putText(drawn, label, (corner[0], corner[1] - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, _WHITE, 1)
+    return drawn

@@ -35,7 +35,7 @@ class AlignmentParameters:
         high=1e4,
     )
     side_bias_px: float = parameter(
-        1.73, "What the detector reports less than the true side length", unit="px", low=-20.0, high=20.0
+        2.65, "What the detector reports less than the true side length", unit="px", low=-20.0, high=20.0
     )
     distance_m: float = parameter(
         0.328, "Distance from lens to Target face in formation", unit="m", low=0.01, high=10.0

@@ -125,6 +125,7 @@ class Host:
         place = Place(robot if entry.robots else "", self._parameters.formation)
         self._pacer = Pacer(getattr(parameters, "real_time_factor", 0.0))
         self._component: Component = component_class(parameters, place)
+        self._component.wall_clock = time.perf_counter
         if settable:
             take_changes(node, parameters, self._set_parameters)
         self._outbox = Outbox(

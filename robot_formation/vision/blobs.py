@@ -1,142 +1,124 @@
-"""From row segments to blobs: one pass over the rows, connecting what overlaps the row above (Pixy2 behaviour)."""
+"""From row segments to blobs: connecting what overlaps the row above (Pixy2 behaviour)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from typing import NamedTuple
 
-from robot_formation.vision.strands import Strand
+import numpy as np
 
-_NO_ROW = -1
+from robot_formation.vision.picture import HEIGHT
+from robot_formation.vision.scanner import Segments
+from robot_formation.vision.teaching import IntArray
+
+_ROW = 256
+"""More than a row has cells, so that places in different rows never overlap."""
+_SIGNATURE = 256 * _ROW
+"""More than a picture has rows, so that the rows of different signatures are never neighbours."""
+_DOUBLINGS = (HEIGHT - 1).bit_length()
+"""Steps of twice the reach that lead from any row to the first one."""
 
 
-class Blob:
-    """A connected component in cells (columns) and rows, all inclusive.
+class Blob(NamedTuple):
+    """A connected component in cells (columns) and rows, all sides inclusive."""
 
-    `row`, `start` and `end` span its most recent finished row, `next_*` the row being built (next_row -1: none).
+    signature: int
+    left: int
+    right: int
+    top: int
+    bottom: int
+    area: int
+
+
+def connect(segments: Segments) -> dict[int, list[Blob]]:
+    """Connect row segments to the blobs of each signature, largest area first.
+
+    A segment joins what it overlaps or touches by one column, diagonals included, on the row above; a blob spans there
+    the gaps between its own segments too. Blobs that ended with fewer than three rows are left out.
+
+    The camera keeps the blobs that can still grow in a list and looks for ended ones as it goes along it. Blobs of
+    equal area come in the reverse order of their ends, those that ended together from right to left. (The camera may
+    notice an end a row late beyond its row's last segment; that is not followed, and exchanges equal areas at most.)
     """
-
-    __slots__ = ("area", "end", "left", "next_end", "next_row", "next_start", "right", "row", "start", "top")
-
-    def __init__(self, row: int, start: int, end: int) -> None:
-        self.left = start
-        self.right = end
-        self.top = row
-        self.area = end - start + 1
-        self.row = row
-        self.start = start
-        self.end = end
-        self.next_row = _NO_ROW
-        self.next_start = start
-        self.next_end = end
-
-    def attach(self, row: int, start: int, end: int) -> None:
-        """Add a segment of the row being built."""
-        self.area += end - start + 1
-        if start < self.left:
-            self.left = start
-        if end > self.right:
-            self.right = end
-        if self.next_row == _NO_ROW:
-            self.next_row = row
-            self.next_start = start
-        self.next_end = end
-
-    def extend(self, strand: Strand) -> None:
-        """Add the rows of a strand after its first one, which is part of the blob already."""
-        _, start, end, last, last_start, last_end, left, right, area = strand
-        self.left = min(self.left, left)
-        self.right = max(self.right, right)
-        self.area += area - (end - start + 1)
-        self.next_row = last
-        self.next_start = last_start
-        self.next_end = last_end
-
-    def absorb(self, other: Blob) -> None:
-        """Take over a blob to the right that the row being built connects to this one."""
-        self.area += other.area
-        self.left = min(self.left, other.left)
-        self.right = max(self.right, other.right)
-        self.top = min(self.top, other.top)
-        self.end = max(self.end, other.end)
-
-    def finish_row(self) -> None:
-        """Make the row being built the most recent finished one."""
-        if self.next_row != _NO_ROW:
-            self.row = self.next_row
-            self.start = self.next_start
-            self.end = self.next_end
-            self.next_row = _NO_ROW
+    if not len(segments.row):
+        return {}
+    order = segments.signature.astype(np.uint8).argsort(kind="stable")
+    signature, row, start, end = (array.take(order) for array in segments)
+    rows = signature * _SIGNATURE + row * _ROW
+    root = _roots(rows, rows + start, rows + end)
+    area = np.zeros_like(root)
+    np.add.at(area, root, end - start + 1)
+    left, right, bottom, place = start.copy(), end.copy(), row.copy(), start.copy()
+    np.minimum.at(left, root, start)
+    np.maximum.at(right, root, end)
+    # Segments come from top to bottom: the last assignment counts.
+    bottom[root] = row
+    place[root] = start
+    blobs = (root == np.arange(len(root))).nonzero()[0]
+    signature, left, right, top, bottom, area, place = (
+        array.take(blobs) for array in (signature, left, right, row, bottom, area, place)
+    )
+    noticed = _ends(rows, signature, bottom)
+    kept = ((noticed == len(rows)) | (bottom - top > 1)).nonzero()[0]
+    kept = kept.take(np.lexsort((-place.take(kept), -noticed.take(kept), -area.take(kept), signature.take(kept))))
+    columns = (array.take(kept).tolist() for array in (signature, left, right, top, bottom, area))
+    found: dict[int, list[Blob]] = {}
+    for blob in map(Blob, *columns):
+        found.setdefault(blob.signature, []).append(blob)
+    return found
 
 
-def connect(strands: Iterable[Strand]) -> list[Blob]:
-    """Connect the strands of one signature, in the order of the scan, to blobs, largest area first.
+def _ends(rows: IntArray, signature: IntArray, bottom: IntArray) -> IntArray:
+    """The segment at which each blob's end is noticed: in the next row but one or later; all segments if in none."""
+    noticed = rows.searchsorted(signature * _SIGNATURE + (bottom + 2) * _ROW)
+    noticed[rows.take(noticed, mode="clip") // _SIGNATURE != signature] = len(rows)
+    return noticed
 
-    A strand joins a blob that it overlaps or touches by one column, diagonals included, on the row above. The blobs
-    that can still grow are kept from left to right; a new one goes before the cursor, out of reach of its own row.
+
+def _roots(rows: IntArray, left: IntArray, right: IntArray) -> IntArray:
+    """The first segment of each segment's blob, shape (n,).
+
+    Args:
+        rows: place of each segment's row, ascending.
+        left: place of each segment's first cell, ascending.
+        right: place of each segment's last cell, ascending.
     """
-    active: list[Blob] = []
-    finished: list[Blob] = []
-    current = _NO_ROW
-    cursor = 0
-    for strand in strands:
-        row, start, end, last_row = strand[:4]
-        if row != current:
-            current = row
-            cursor = 0
-            _refresh(active, 0, row, finished)
-            _refresh(active, 1, row, finished)
-        while cursor < len(active):
-            blob = active[cursor]
-            if start > blob.end:
-                cursor += 1
-                _refresh(active, cursor + 1, row, finished)
-                continue
-            if end < blob.start:
-                blob = Blob(row, start, end)
-                active.insert(cursor, blob)
-                cursor += 1
-                break
-            blob.attach(row, start, end)
-            following = cursor + 1
-            while following < len(active) and end >= active[following].start:
-                blob.absorb(active.pop(following))
-                _refresh(active, following, row, finished)
-            break
+    first = right.searchsorted(left - _ROW)
+    parents = left.searchsorted(right - _ROW, "right") - first
+    own = np.arange(len(rows))
+    root = np.where(parents > 0, first, own)
+    for _ in range(_DOUBLINGS):
+        root = root.take(root)
+    # Left to do: segments with several parents, and those without one between two segments of the row above.
+    before, after = rows.take(first - 1, mode="wrap"), rows.take(first, mode="clip")
+    between = (parents == 0) & (before == after) & (before == rows - _ROW)
+    special = (between | (parents > 1)).nonzero()[0].tolist()
+    if not special:
+        return root
+    joined = _joined(root, special, first.take(special).tolist(), parents.take(special).tolist())
+    for segment in joined:
+        own[segment] = _find(joined, segment)
+    return own.take(root)
+
+
+def _joined(root: IntArray, special: list[int], first: list[int], parents: list[int]) -> dict[int, int]:
+    """Join blobs through special segments, from top to bottom: which root belongs to which earlier one."""
+    joined: dict[int, int] = {}
+    for segment, parent, count in zip(special, first, parents, strict=True):
+        if count:
+            # Its own root is that of its first parent.
+            for other in root[parent + 1 : parent + count].tolist():
+                one, two = sorted((_find(joined, int(root[segment])), _find(joined, other)))
+                if one != two:
+                    joined[two] = one
         else:
-            blob = Blob(row, start, end)
-            active.append(blob)
-            cursor += 1
-        if last_row > row:
-            blob.extend(strand)
-            _finish_others(active, blob, finished)
-    for blob in active:
-        blob.finish_row()
-    # The camera puts each finished blob in front of the earlier ones: that decides among equal areas.
-    return sorted([*reversed(active), *reversed(finished)], key=_by_area)
+            # It lies in a gap of the row above, within a blob if both neighbours belong to the same one.
+            neighbour = _find(joined, int(root[parent - 1]))
+            if neighbour == _find(joined, int(root[parent])):
+                joined[segment] = neighbour
+    return joined
 
 
-def _by_area(blob: Blob) -> int:
-    return -blob.area
-
-
-def _finish_others(active: list[Blob], blob: Blob, finished: list[Blob]) -> None:
-    """Finish all blobs but one, to which alone the next row belongs."""
-    for other in active:
-        if other is not blob:
-            other.finish_row()
-            if other.row - other.top > 1:
-                finished.append(other)
-    active[:] = [blob]
-
-
-def _refresh(active: list[Blob], position: int, row: int, finished: list[Blob]) -> None:
-    """Bring the blob at a position up to date for a row, first removing those that missed a row."""
-    while position < len(active):
-        blob = active[position]
-        if blob.next_row != _NO_ROW:
-            blob.finish_row()
-        if row - blob.row <= 1:
-            return
-        del active[position]
-        if blob.row - blob.top > 1:
-            finished.append(blob)
+def _find(joined: dict[int, int], segment: int) -> int:
+    while segment in joined:
+        segment = joined[segment]
+    return segment

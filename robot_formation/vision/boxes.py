@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -51,25 +52,15 @@ class Box:
         """Row of the centre, pixels."""
         return (self.top + self.bottom) >> 1
 
-    def contains(self, other: Box) -> bool:
-        """Whether the other box lies within this one, common sides allowed."""
-        return (
-            self.left <= other.left
-            and other.right <= self.right
-            and self.top <= other.top
-            and other.bottom <= self.bottom
-        )
 
-
-def filtered(signature: int, blobs: Iterable[Blob], min_area: int, room: int) -> list[Box]:
+def filtered(blobs: Iterable[Blob], min_area: int, room: int) -> list[Box]:
     """Boxes of the blobs of at least min_area cells and three rows, at most `room` of them."""
-    boxes: list[Box] = []
-    for blob in blobs:
-        if len(boxes) >= room:
-            break
-        if blob.area >= min_area and blob.row - blob.top > 1:
-            boxes.append(Box(signature, 2 * blob.left, 2 * blob.right, blob.top, blob.row))
-    return boxes
+    boxes = [
+        Box(signature, 2 * left, 2 * right, top, bottom)
+        for signature, left, right, top, bottom, area in blobs
+        if area >= min_area and bottom - top > 1
+    ]
+    return boxes[:room]
 
 
 def merged(boxes: list[Box], distance: int) -> list[Box]:
@@ -84,14 +75,24 @@ def merged(boxes: list[Box], distance: int) -> list[Box]:
         while boxes:
             box, *others = boxes
             boxes = []
+            left, right, top, bottom = _reach(box, distance)
             for other in others:
-                if _merge(box, other, distance):
+                # Most pairs are far apart: that is told first, and fast.
+                if other.left > right or other.right < left or other.top > bottom or other.bottom < top:
+                    boxes.append(other)
+                elif _merge(box, other, distance):
                     changed = True
+                    left, right, top, bottom = _reach(box, distance)
                 else:
                     boxes.append(other)
             alive.append(box)
         boxes = alive
     return boxes
+
+
+def _reach(box: Box, distance: int) -> tuple[int, int, int, int]:
+    """Left, right, top and bottom of what is near enough to a box to be merged with it."""
+    return box.left - distance, box.right + distance, box.top - distance, box.bottom + distance
 
 
 def _merge(box: Box, other: Box, distance: int) -> bool:
@@ -123,17 +124,31 @@ def _joined(low: int, high: int, other_low: int, other_high: int, distance: int)
 
 
 def without_nested(boxes: list[Box]) -> list[Box]:
-    """Drop boxes that lie within another one, whatever their signatures."""
+    """Drop boxes that lie within another one, common sides allowed, whatever their signatures."""
     dead: set[int] = set()
-    for i, box in enumerate(boxes):
-        if i in dead:
+    turn = -1
+    for i, j in _nested_pairs(boxes):
+        if j in dead or (i in dead and i != turn):
             continue
-        for j in range(i + 1, len(boxes)):
-            if j in dead:
-                continue
-            if box.contains(boxes[j]):
-                dead.add(j)
-            elif boxes[j].contains(box):
-                # The camera goes on comparing later boxes with the one that it has just dropped.
-                dead.add(i)
+        # The camera goes on comparing later boxes with the one that it has just dropped, until that one's turn ends.
+        turn = i
+        dead.add(j if _contains(boxes[i], boxes[j]) else i)
     return [box for i, box in enumerate(boxes) if i not in dead]
+
+
+def _nested_pairs(boxes: list[Box]) -> list[tuple[int, int]]:
+    """Pairs i < j of boxes one of which lies within the other, in ascending order."""
+    pairs = []
+    from_left = sorted((box.left, i, box) for i, box in enumerate(boxes))
+    for place, (_, i, box) in enumerate(from_left, 1):
+        right = box.right
+        for left, j, other in itertools.islice(from_left, place, None):
+            if left > right:
+                break
+            if _contains(box, other) or _contains(other, box):
+                pairs.append((i, j) if i < j else (j, i))
+    return sorted(pairs)
+
+
+def _contains(box: Box, other: Box) -> bool:
+    return box.left <= other.left and other.right <= box.right and box.top <= other.top and other.bottom <= box.bottom

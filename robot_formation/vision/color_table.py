@@ -52,8 +52,9 @@ class ColorTable:
 
     Attributes:
         labels: signature number or 0 by 256 * iu + iv, shape (16384,), uint8; iu is the bin of r-g, iv that of b-g.
-        low: exclusive lower bounds of u and v by signature number, shape (2, 8).
-        high: exclusive upper bounds, alike.
+        low: lower bounds of (r-g)/(r+g+b) and (b-g)/(r+g+b) by signature number, shape (2, 8). A quotient above its
+            bound is one whose u (or v), truncated to whole 1/32768, is above the run-time bound.
+        high: upper bounds, alike.
         min_sum: smallest r+g+b.
     """
 
@@ -77,9 +78,18 @@ class ColorTable:
             u_min, u_max, v_min, v_max = run_time_bounds(signature, parameters.range_of(signature.sig), code=code)
             inside = (u > u_min) & (u < u_max) & (v > v_min) & (v < v_max) & (total >= min_sum)
             labels[bins[inside]] = signature.sig
-            low[:, signature.sig] = u_min, v_min
-            high[:, signature.sig] = u_max, v_max
+            low[:, signature.sig] = [_above(bound) for bound in (u_min, v_min)]
+            high[:, signature.sig] = [-_above(-bound) for bound in (u_max, v_max)]
         return cls(labels, low, high, min_sum)
+
+
+def _above(bound: int) -> float:
+    """The chroma, as a fraction, above which a chroma truncated toward zero exceeds an integer bound in 1/32768.
+
+    From 0 on it must reach the next integer. Sums of two pixels are at most 1530, so no quotient lies within 1/4096
+    below an integer.
+    """
+    return (bound + 1 - 1 / 4096 if bound >= 0 else bound) / (1 << SCALE_BITS)
 
 
 _Int32 = npt.NDArray[np.int32]

@@ -14,7 +14,6 @@ from robot_formation.vision.parameters import DetectorParameters
 from robot_formation.vision.picture import checked
 from robot_formation.vision.scanner import Scanner, Segments
 from robot_formation.vision.signatures import Signature, sorted_unique
-from robot_formation.vision.strands import strands
 from robot_formation.vision.tracking import Tracker, limited
 
 ALL_SIGNATURES = 0xFF
@@ -122,11 +121,10 @@ class BlockDetector:
         parameters = self._parameters
         boxes: list[Box] = []
         room = parameters.max_blocks
-        found = strands(segments)
-        for number in sorted(found):
+        for number, blobs in connect(segments).items():
             code = number in self._codes
-            blobs = connect(found[number])[: parameters.max_blocks_per_signature]
-            mine = filtered(number, blobs, CODE_AREA if code else parameters.min_block_area, room)
+            min_area = CODE_AREA if code else parameters.min_block_area
+            mine = filtered(blobs[: parameters.max_blocks_per_signature], min_area, room)
             room -= len(mine)
             boxes += mine if code else merged(mine, parameters.max_merge_dist)
         boxes = without_nested(boxes)

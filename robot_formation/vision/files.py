@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import contextlib
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 import yaml
 
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.vision.block import Block
-from robot_formation.vision.parameters import DetectorParameters
-from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError
+from robot_formation.vision.parameters import SIGNATURES, DetectorParameters
+from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError, scaled
 
+CAMERA_PARAMETERS = {
+    "camera_brightness",
+    "auto_exposure_correction",
+    "auto_white_balance",
+    "auto_white_balance_on_power_up",
+    "flicker_avoidance",
+    "min_frames_per_second",
+}
+"""What PixyMon offers beside the detector's parameters: it acts on how a picture is taken, in the world's camera."""
 _DRAWN_SCALE = 3
+_STDERR = 2
+_MOST_COMPLAINTS = 4096
+_RANGE = re.compile(rf"signature_([1-{SIGNATURES}])_range")
 
 
 def read_picture(path: str | Path, warn: Callable[[str], None]) -> Picture:
@@ -22,7 +40,7 @@ def read_picture(path: str | Path, warn: Callable[[str], None]) -> Picture:
 
     Args:
         path: any format that OpenCV reads.
-        warn: told in one line if the image has another size and is scaled.
+        warn: told in one line each if the image is damaged, or has another size and is scaled.
 
     Raises:
         PictureError: if the file can't be read or holds no image.
@@ -31,21 +49,56 @@ def read_picture(path: str | Path, warn: Callable[[str], None]) -> Picture:
         content = np.frombuffer(Path(path).read_bytes(), np.uint8)
     except OSError as error:
         raise PictureError(f"{path}: can't be read ({error.strerror}); give an image file") from error
-    try:
-        image = cv2.imdecode(content, cv2.IMREAD_COLOR) if len(content) else None
-    except cv2.error:
-        image = None
+    image, complaints = _decoded(content)
     if image is None:
         raise PictureError(f"{path}: holds no image that OpenCV can read; give a PNG, JPEG, BMP, TIFF or WebP file")
+    if complaints:
+        warn(f"{path}: damaged, used as far as it can be read ({complaints[0]:.100})")
     height, width = image.shape[:2]
     if (width, height) != (WIDTH, HEIGHT):
         warn(f"{path}: {width} x {height} pixels, scaled to {WIDTH} x {HEIGHT}")
-        image = cv2.resize(image, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
-    return np.ascontiguousarray(image[:, :, ::-1])
+    return np.ascontiguousarray(scaled(image)[:, :, ::-1])
 
 
-def read_parameters(path: str | Path) -> DetectorParameters:
+def _decoded(content: npt.NDArray[np.uint8]) -> tuple[Picture | None, list[str]]:
+    """Decode an image file's bytes: BGR or None, and what the image libraries complain about."""
+    if not len(content):
+        return None, []
+    with tempfile.TemporaryFile() as printed:
+        with _standard_error_to(printed.fileno()):
+            try:
+                image = cv2.imdecode(content, cv2.IMREAD_COLOR)
+            except (cv2.error, MemoryError):
+                image = None
+        printed.seek(0)
+        lines = printed.read(_MOST_COMPLAINTS).decode(errors="replace").splitlines()
+    return image, [line for line in lines if line.strip()]
+
+
+@contextlib.contextmanager
+def _standard_error_to(target: int) -> Iterator[None]:
+    """Divert standard error: image libraries print about damaged files, past Python's sys.stderr."""
+    try:
+        kept = os.dup(_STDERR)
+    except OSError:  # it is closed, so that nothing can be printed
+        yield
+        return
+    try:
+        os.dup2(target, _STDERR)
+        yield
+    finally:
+        os.dup2(kept, _STDERR)
+        os.close(kept)
+
+
+def read_parameters(path: str | Path, warn: Callable[[str], None]) -> DetectorParameters:
     """Read detector parameters from a YAML or JSON file with any subset of them; the others keep their defaults.
+
+    Names may be written as here or as in PixyMon ("Min block area", "Signature 1 range").
+
+    Args:
+        path: the file.
+        warn: told in one line if the file holds parameters of the camera, which have no effect on taken pictures.
 
     Raises:
         ParameterError: if the file can't be read, or a name or value is wrong.
@@ -58,7 +111,40 @@ def read_parameters(path: str | Path) -> DetectorParameters:
         raise ParameterError(f"{path}: is neither YAML nor JSON ({' '.join(str(error).split())[:120]})") from error
     if not isinstance(content, Mapping) or not all(isinstance(name, str) for name in content):
         raise ParameterError(f"{path}: holds no parameters; give lines like 'min_block_area: 20'")
-    return from_mapping(DetectorParameters, content, where=str(path))
+    values = _by_own_names(content, str(path))
+    of_camera = [name for name in values if name in CAMERA_PARAMETERS]
+    if of_camera:
+        warn(
+            f"{path}: {', '.join(of_camera)}: no effect on a picture that is taken already; they are parameters of "
+            "the world's camera"
+        )
+    own = {name: value for name, value in values.items() if name not in CAMERA_PARAMETERS}
+    try:
+        return from_mapping(DetectorParameters, own, where=str(path))
+    except ParameterError:
+        raise
+    except (ValueError, RecursionError) as error:  # a number too long to print, a mapping within itself
+        raise ParameterError(f"{path}: holds a value that can't be used ({error}); correct it") from error
+
+
+def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Parameters by our names: in lower case with underscores, the signatures' ranges in one list."""
+    values: dict[str, Any] = {}
+    ranges: dict[int, Any] = {}
+    for given, value in content.items():
+        name = "_".join(re.findall("[a-z0-9]+", given.lower()))
+        single = _RANGE.fullmatch(name)
+        known: dict[Any, Any] = ranges if single else values
+        key = int(single[1]) if single else name or given
+        if key in known:
+            raise ParameterError(f"{where}: '{given}' is given twice; keep one of them")
+        known[key] = value
+    if ranges:
+        if "signature_range" in values:
+            raise ParameterError(f"{where}: give either 'signature_range' or the signatures' ranges one by one")
+        default = DetectorParameters().signature_range
+        values["signature_range"] = [ranges.get(number + 1, value) for number, value in enumerate(default)]
+    return values
 
 
 def write_drawn(path: str | Path, picture: Picture, blocks: Iterable[Block]) -> None:

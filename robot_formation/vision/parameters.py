@@ -61,6 +61,14 @@ class DetectorParameters:
         choices=(0, 1, 2, 3),
     )
 
+    led_brightness: int = parameter(
+        750,
+        "LED brightness: most current of the camera's own lamp; only kept for the camera, since no lamp is simulated",
+        unit="uA",
+        low=0,
+        high=20000,
+    )
+
     def __post_init__(self) -> None:
         """Refuse more ranges than there are signatures."""
         if len(self.signature_range) > SIGNATURES:

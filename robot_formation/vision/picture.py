@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -40,3 +41,11 @@ def checked(picture: Any) -> Picture:
             f"the picture must have shape ({HEIGHT}, {WIDTH}, 3), not {picture.shape}; scale it to that size"
         )
     return np.ascontiguousarray(picture)
+
+
+def scaled(picture: Picture) -> Picture:
+    """Bring an RGB (or BGR) picture of any size, shape (rows, columns, 3), to the camera's size."""
+    if picture.shape[:2] == (HEIGHT, WIDTH):
+        return picture
+    resized = cv2.resize(np.ascontiguousarray(picture), (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+    return np.asarray(resized, np.uint8)

@@ -183,7 +183,12 @@ def load_signatures(path: str | Path) -> list[Signature]:
     listed = content.get("signatures") if isinstance(content, Mapping) else None
     if not isinstance(listed, list) or not listed:
         raise SignatureError(f"{path}: holds no signatures (a list 'signatures'); make one with 'formation teach'")
-    signatures = [Signature.from_mapping(item, where=str(path)) for item in listed]
+    try:
+        signatures = [Signature.from_mapping(item, where=str(path)) for item in listed]
+    except SignatureError:
+        raise
+    except ValueError as error:  # a number too long to print
+        raise SignatureError(f"{path}: holds a number that can't be used ({error}); teach it again") from error
     try:
         return sorted_unique(signatures)
     except SignatureError as error:

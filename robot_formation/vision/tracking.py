@@ -110,7 +110,7 @@ class Tracker:
     def _assign(self, boxes: Sequence[Box], interval: int) -> list[int | None]:
         """The track number that owns each box, or None."""
         owners: list[int | None] = [None] * len(boxes)
-        costs = [[self._cost(track.box, box, interval) for box in boxes] for track in self._tracks]
+        costs = self._costs(boxes, interval)
         searching = set(range(len(self._tracks)))
         assigned = True
         while assigned:
@@ -129,11 +129,11 @@ class Tracker:
                 assigned = True
         return owners
 
-    def _choose(self, number: int, owners: list[int | None], costs: list[list[float]]) -> int | None:
+    def _choose(self, number: int, owners: list[int | None], costs: list[dict[int, int]]) -> int | None:
         """The cheapest box that is free or that this track may take from its owner."""
         best: int | None = None
         lowest = math.inf
-        for box, cost in enumerate(costs[number]):
+        for box, cost in costs[number].items():
             if cost >= lowest:
                 continue
             owner = owners[box]
@@ -146,20 +146,22 @@ class Tracker:
             best, lowest = box, cost
         return best
 
-    def _cost(self, old: Box, new: Box, interval: int) -> float:
-        """Mean square distance of the sides, infinite for another signature or too large a jump."""
-        if old.signature != new.signature:
-            return math.inf
-        dx = new.x - old.x
-        dy = new.y - old.y
-        if ((dx * dx + dy * dy) >> 1) * FRAME_US // interval > self._gate:
-            return math.inf
-        return (
-            (new.left - old.left) ** 2
-            + (new.right - old.right) ** 2
-            + (new.top - old.top) ** 2
-            + (new.bottom - old.bottom) ** 2
-        ) >> 2
+    def _costs(self, boxes: Sequence[Box], interval: int) -> list[dict[int, int]]:
+        """For each track the boxes of its signature that are no larger jump than allowed, with their cost."""
+        candidates: dict[int, list[tuple[int, int, int, Box]]] = {}
+        for number, box in enumerate(boxes):
+            candidates.setdefault(box.signature, []).append((number, box.x, box.y, box))
+        costs: list[dict[int, int]] = []
+        for track in self._tracks:
+            old = track.box
+            x, y = old.x, old.y
+            near: dict[int, int] = {}
+            for number, new_x, new_y, new in candidates.get(old.signature, ()):
+                jump = ((new_x - x) ** 2 + (new_y - y) ** 2) >> 1
+                if jump * FRAME_US // interval <= self._gate:
+                    near[number] = _difference(old, new)
+            costs.append(near)
+        return costs
 
     def _update(self, track: _Track, box: Box | None, now: int) -> bool:
         """Advance a track by one frame; False if it is to be removed."""
@@ -180,6 +182,12 @@ class Tracker:
         else:
             return elapsed < self._trail
         return True
+
+
+def _difference(old: Box, new: Box) -> int:
+    """Mean square distance of the sides, square pixels."""
+    sides = (new.left - old.left) ** 2 + (new.right - old.right) ** 2
+    return (sides + (new.top - old.top) ** 2 + (new.bottom - old.bottom) ** 2) >> 2
 
 
 def limited(blocks: Sequence[Block], sigmap: int, max_blocks: int) -> list[Block]:

@@ -1,11 +1,12 @@
 """Simulated robots and cameras on a surface: bodies, traction, motors, encoders, pictures, and the rule of time."""
 
-from robot_formation.world.camera import Camera, Picture, Sensor
+from robot_formation.world.camera import Camera, Picture
 from robot_formation.world.checks import WorldError
 from robot_formation.world.events import JOINT_NAMES, BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose, pose_on_surface
 from robot_formation.world.robot import RobotStart
+from robot_formation.world.sensor import Development, Sensor
 from robot_formation.world.state import WorldState
 from robot_formation.world.teaching import marker_picture
 from robot_formation.world.world import World
@@ -14,6 +15,7 @@ __all__ = [
     "JOINT_NAMES",
     "BodyState",
     "Camera",
+    "Development",
     "Event",
     "Frame",
     "JointStates",

@@ -1,23 +1,22 @@
-"""What a robot's camera sees: direct projection of the scene, and the sensor's noise."""
+"""What falls on a robot's camera: direct projection of the scene, before the sensor sees it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from functools import lru_cache
-from typing import Any
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.surface import Surface
-from robot_formation.world.imperfections import generator
 from robot_formation.world.parameters import CameraParameters, WorldParameters
 from robot_formation.world.pose import Pose
 from robot_formation.world.scene import FULL, Scene
 
 Picture = NDArray[np.uint8]
+Light = NDArray[np.uint16]
+"""Linear light (rows, columns, 3): reflectance under the room's light, 65535 is full."""
 
 SUPERSAMPLING = 2
 SHIFT = 6
@@ -25,10 +24,10 @@ SHIFT = 6
 
 
 class Camera:
-    """Pinhole camera on a robot: pictures without noise from `view`, with noise from `expose`.
+    """Pinhole camera on a robot: the light that its lens throws on the sensor; `Sensor` makes pictures of it.
 
     Image coordinates: integer (column, row) are pixel centres, origin top left. Light is computed linearly, averaged
-    over 2 x 2 samples, blurred, and turned into 8 bits by the gamma curve (Pixy2 behaviour: exponent 1/1.5).
+    over 2 x 2 samples and blurred.
     """
 
     def __init__(self, surface: Surface, parameters: WorldParameters) -> None:
@@ -41,7 +40,7 @@ class Camera:
         self._axes = np.stack([right, np.cross(forward, right), forward])  # rows: image right, image down, depth
         self._lens = np.array([p.x_m, p.y_m, p.z_m])
         self._canvas = np.empty((p.height_px * SUPERSAMPLING, p.width_px * SUPERSAMPLING, 3), np.uint16)
-        self._levels = _level_table(p.gamma)
+        self._blurred = np.empty((p.height_px, p.width_px, 3), np.float32)
         self._bounds = _view_bounds(p)
 
     def optical_frame(self, robot: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -56,15 +55,11 @@ class Camera:
         p = self.parameters
         return np.asarray(local[:, :2] / local[:, 2:] * p.focal_length_px + np.array([p.centre_x_px, p.centre_y_px]))
 
-    def view(self, robot: Pose, others: Sequence[Pose]) -> Picture:
-        """Picture without noise, uint8 (rows, columns, 3) RGB, of a robot at `robot` that sees robots at `others`.
+    def light(self, robot: Pose, others: Sequence[Pose]) -> Light:
+        """Light on the sensor, uint16 (rows, columns, 3) red, green, blue, of a robot that sees robots at `others`.
 
-        Poses are base_link poses; no physics is involved.
+        Poses are base_link poses; no physics is involved. The lamp is white and has no strength here.
         """
-        return np.rint(self.light(robot, others)).astype(np.uint8)
-
-    def light(self, robot: Pose, others: Sequence[Pose]) -> NDArray[np.float32]:
-        """The same picture before rounding, float32 in 8-bit levels."""
         p = self.parameters
         rotation, lens = self.optical_frame(robot)
         canvas = self._canvas
@@ -73,11 +68,16 @@ class Camera:
         for other in sorted(others, key=lambda pose: -float(np.sum((np.asarray(pose.position) - lens) ** 2))):
             for world_corners, colour in self._scene.robot_faces(other, lens):
                 self._fill((world_corners - lens) @ rotation.T, colour)
-        small = cv2.resize(canvas, (p.width_px, p.height_px), interpolation=cv2.INTER_AREA)
+        small: Light = np.asarray(
+            cv2.resize(canvas, (p.width_px, p.height_px), interpolation=cv2.INTER_AREA), np.uint16
+        )
         if p.blur_px > 0.0:
-            cv2.GaussianBlur(small, (3, 3), p.blur_px, dst=small, borderType=cv2.BORDER_REPLICATE)
-        light: NDArray[np.float32] = self._levels.take(small)
-        return light
+            # OpenCV blurs floats twice as fast as 16-bit integers.
+            blurred = self._blurred
+            np.copyto(blurred, small)
+            cv2.GaussianBlur(blurred, (3, 3), p.blur_px, dst=blurred, borderType=cv2.BORDER_REPLICATE)
+            small = np.rint(blurred, out=blurred).astype(np.uint16)
+        return small
 
     def _draw_plate(self, lens: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
         """Draw the patches of the plate that are in view, far to near."""
@@ -139,51 +139,3 @@ def clip_near(corners: NDArray[np.float64], near: float) -> NDArray[np.float64]:
         if inside != next_inside:
             kept.append(a + (b - a) * ((near - a[2]) / (b[2] - a[2])))
     return np.array(kept).reshape(-1, 3)
-
-
-@lru_cache(maxsize=8)
-def _level_table(gamma: float) -> NDArray[np.float32]:
-    """8-bit level (not rounded) of every 16-bit linear light, shape (65536,)."""
-    return (255.0 * (np.arange(65536) / FULL) ** (1.0 / gamma)).astype(np.float32)
-
-
-@lru_cache(maxsize=8)
-def _sigma_table(gamma: float, shot: float, read: float) -> NDArray[np.float32]:
-    """Noise in 8-bit levels by level, shape (256,).
-
-    Variance in linear light is shot * signal + read^2 (MT9M114 data sheet figures), mapped by the curve's slope.
-    """
-    light = np.maximum((np.arange(256) / 255.0) ** gamma, 1e-3)
-    slope = 255.0 / gamma * light ** (1.0 / gamma - 1.0)
-    return np.asarray(slope * np.sqrt(shot * light + read * read), np.float32)
-
-
-class Sensor:
-    """Noise of one robot's camera: depends on the seed, the robot and how many frames it has drawn, nothing else."""
-
-    def __init__(self, parameters: CameraParameters, seed: int, robot: str) -> None:
-        self._stream = generator(seed, robot, "camera")
-        self._shape = (parameters.height_px, parameters.width_px, 3)
-        self._size = parameters.height_px * parameters.width_px * 3
-        self._pool = self._stream.standard_normal(3 * self._size, dtype=np.float32)
-        self._sigmas = _sigma_table(parameters.gamma, parameters.shot_noise, parameters.read_noise)
-        self._scratch = np.empty(self._shape, np.float32)
-
-    def save(self) -> dict[str, Any]:
-        """Take the state of the random stream."""
-        return dict(self._stream.bit_generator.state)
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Put back what `save` took."""
-        self._stream.bit_generator.state = dict(state)
-
-    def sigma(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Standard deviation of every pixel and channel, in 8-bit levels, of a picture by `Camera.light`."""
-        return np.asarray(cv2.LUT(light.astype(np.uint8), self._sigmas), np.float32)
-
-    def expose(self, light: NDArray[np.float32], sigma: NDArray[np.float32]) -> Picture:
-        """One noisy frame, uint8, of a picture and its `sigma`."""
-        offset = int(self._stream.integers(0, 2 * self._size))
-        noise = self._pool[offset : offset + self._size].reshape(self._shape)
-        cv2.multiply(noise, sigma, dst=self._scratch)
-        return np.asarray(cv2.add(light, self._scratch, dtype=cv2.CV_8U), np.uint8)

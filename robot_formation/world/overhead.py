@@ -48,7 +48,7 @@ class _Outlines(NamedTuple):
 
 
 class OverheadCamera:
-    """Grey pictures from above, 8 bits by the gamma curve of the robots' cameras.
+    """Grey pictures from above, 8 bits by the gamma curve of the robots' cameras; white in full light is 255.
 
     Image coordinates: integer (column, row) are pixel centres, origin top left; columns grow along the world's x, rows
     against its y. A picture depends on the seed, the poses and its number and on nothing else: not on earlier pictures.
@@ -65,7 +65,7 @@ class OverheadCamera:
         self._size = p.width_px * p.height_px
         self._widest = 2.0 * math.hypot(p.width_px, p.height_px) / p.focal_length_px
         self._gamma = parameters.camera.gamma
-        self._plate = self._empty_plate(self._scene.wall_light * p.floor_albedo / parameters.camera.wall_albedo)
+        self._plate = self._empty_plate(p.floor_albedo / 255.0)
         self._canvas = self._plate.copy()
         self._picture = self._sampled(self._canvas)
         self._drawn: dict[Pose, _Outlines] = {}

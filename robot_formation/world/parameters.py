@@ -119,12 +119,40 @@ class ImperfectionParameters:
 
 @dataclass(frozen=True)
 class CameraParameters:
-    """Sideways camera (Pixy2: 60 degrees over 316 pixels) and how it sees light."""
+    """Sideways camera (Pixy2: 60 degrees over 316 pixels), its sensor, and the room's light.
+
+    Descriptions of what a user tunes on the camera begin with the parameter's name in PixyMon.
+    """
 
     mode: str = parameter(
         "stream", "stream: a frame at every tick while time advances; on_demand: requested frames", choices=CAMERA_MODES
     )
-    frame_rate_hz: int = parameter(30, "ticks per simulated second", unit="Hz", low=1, high=1000)
+    camera_brightness: int = parameter(
+        100,
+        "Camera brightness: mean level of the picture that auto exposure aims at (camera's default: 50)",
+        low=0,
+        high=255,
+    )
+    auto_exposure_correction: bool = parameter(
+        True,
+        "Auto Exposure Correction: choose exposure time and gain for each picture; false: keep the first picture's",
+    )
+    auto_white_balance: bool = parameter(
+        True, "Auto White Balance: make grey grey in each picture; false: keep what power-up gave (camera's default)"
+    )
+    auto_white_balance_on_power_up: bool = parameter(
+        True, "Auto White Balance on power-up: balance the first picture; false: the camera's own colours"
+    )
+    flicker_avoidance: bool = parameter(
+        True, "Flicker avoidance: expose for whole periods of the light's flicker (camera's default: false)"
+    )
+    min_frames_per_second: int = parameter(
+        30,
+        "Min frames per second: the frame rate, and with it the longest exposure (camera's default: 61)",
+        unit="Hz",
+        low=2,
+        high=61,
+    )
     width_px: int = parameter(316, "columns", unit="px", low=16, high=4096)
     height_px: int = parameter(208, "rows", unit="px", low=16, high=4096)
     focal_length_px: float = parameter(273.7, "focal length in x and y", unit="px", low=10.0, high=1e4)
@@ -138,18 +166,30 @@ class CameraParameters:
     )
     tilt_deg: float = parameter(0.0, "direction of view above the horizontal", unit="deg", low=-89.0, high=89.0)
     near_m: float = parameter(0.02, "nearest distance drawn", unit="m", low=1e-3, high=1.0)
-    background_level: float = parameter(100.0, "exposure: 8-bit level of the grey wall", low=10.0, high=250.0)
     gamma: float = parameter(1.5, "8-bit level = 255 light^(1/gamma)", low=1.0, high=3.0)
     blur_px: float = parameter(0.5, "standard deviation of the lens blur, 0 for none", unit="px", low=0.0, high=10.0)
-    shot_noise: float = parameter(2.0e-4, "variance per linear light, full scale 1", low=0.0, high=1.0)
-    read_noise: float = parameter(2.9e-4, "standard deviation in the dark, linear, full scale 1", low=0.0, high=1.0)
-    wall_albedo: int = parameter(64, "grey of the wall behind the plate, linear", low=1, high=255)
+    shot_noise: float = parameter(2.0e-4, "variance per linear light at gain 1, full scale 1", low=0.0, high=1.0)
+    read_noise: float = parameter(
+        2.9e-4, "standard deviation in the dark at gain 1, linear, full scale 1", low=0.0, high=1.0
+    )
+    illuminance_lux: float = parameter(500.0, "light in the room", unit="lx", low=0.0, high=2e5)
+    light_colour_rgb: tuple[int, ...] = parameter((255, 255, 255), "colour of the light, linear", low=1, high=255)
+    mains_hz: int = parameter(50, "mains frequency; lamps flicker at twice of it", unit="Hz", choices=(50, 60))
+    mains_flicker: float = parameter(
+        0.2, "depth of the flicker: light is 1 + depth cos(4 pi mains_hz t)", low=0.0, high=1.0
+    )
+    wall_albedo: int = parameter(150, "grey of the wall behind the plate, linear", low=1, high=255)
     plate_albedo: int = parameter(66, "grey of the plate, linear", low=1, high=255)
     plate_patches: int = parameter(12, "shaded patches per edge of the plate", low=1, high=200)
     ambient: float = parameter(0.6, "share of light that comes from everywhere", low=0.0, high=1.0)
     light_x: float = parameter(-0.25, "direction to the lamp, world frame", low=-1.0, high=1.0)
     light_y: float = parameter(-0.35, "direction to the lamp, world frame", low=-1.0, high=1.0)
     light_z: float = parameter(0.90, "direction to the lamp, world frame", low=0.01, high=1.0)
+
+    def __post_init__(self) -> None:
+        """Check that the light's colour has three components."""
+        if len(self.light_colour_rgb) != 3:
+            raise ParameterError("world: 'camera.light_colour_rgb' needs three numbers (red, green, blue)")
 
 
 @dataclass(frozen=True)
@@ -230,7 +270,10 @@ class WorldParameters:
 
     def __post_init__(self) -> None:
         """Check what involves more than one parameter."""
-        for name, rate in (("camera.frame_rate_hz", self.camera.frame_rate_hz), ("state_rate_hz", self.state_rate_hz)):
+        for name, rate in (
+            ("camera.min_frames_per_second", self.camera.min_frames_per_second),
+            ("state_rate_hz", self.state_rate_hz),
+        ):
             if self.physics_hz % rate:
                 raise ParameterError(
                     f"world: '{name}' is {rate} Hz, which is no whole number of physics steps; "

@@ -32,10 +32,10 @@ _SIDES: tuple[tuple[tuple[int, int, int, int], tuple[float, float, float]], ...]
 
 
 class Scene:
-    """Faces to draw, with ambient light and one lamp (Lambert); light is linear, 65535 is full.
+    """Faces to draw, with ambient light and one lamp (Lambert); light is linear, 65535 is white where fully lit.
 
     Attributes:
-        wall_light: linear light of the background, 0 to 1.
+        wall_light: linear light of the evenly lit background, 0 to 1.
         plate_points: corners of the plate's patches in the world, (n, 3), metres.
         patch_corners: indices of each patch's four corners, (patches, 4).
         patch_light: red, green, blue of each patch.
@@ -46,10 +46,7 @@ class Scene:
         lamp = np.array([camera.light_x, camera.light_y, camera.light_z])
         self._lamp = lamp / np.linalg.norm(lamp)
         self._ambient = camera.ambient
-        # The exposure puts the evenly lit wall at the asked 8-bit level.
-        wall = (camera.background_level / 255.0) ** camera.gamma
-        self._exposure = wall / (camera.wall_albedo / 255.0)
-        self.wall_light = wall
+        self.wall_light = camera.wall_albedo / 255.0
         grey = marker.body_rgb
         body = (chassis.length_m, chassis.width_m, chassis.body_top_m - chassis.body_bottom_m)
         foot = marker.top_m - marker.edge_m
@@ -91,9 +88,9 @@ class Scene:
         self.patch_corners = np.array(corners)
 
     def _shade(self, normal: Array, albedo: Array) -> Colour:
-        """Linear light of a face in 16-bit units, at most full."""
+        """Linear light of a face in 16-bit units."""
         light = self._ambient + (1.0 - self._ambient) * max(0.0, float(normal @ self._lamp))
-        r, g, b = np.minimum(albedo * (light * self._exposure), 1.0) * FULL
+        r, g, b = albedo * (light * FULL)
         return (float(r), float(g), float(b))
 
     def robot_faces(self, robot: Pose, lens: Array) -> Iterator[Face]:

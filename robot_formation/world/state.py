@@ -21,7 +21,7 @@ class WorldState:
         step_count: physics steps since the start.
         physics: Bullet's own state, contacts included.
         robots: wheels, encoders, motion and random streams by robot.
-        sensors: state of the random stream of each camera, by robot.
+        sensors: random stream of each camera, and the exposure and white balance that it keeps, by robot.
         frames_owed: frames requested and not given yet, by robot.
         pending: commands of lockstep robots that wait for the others.
     """

@@ -5,18 +5,16 @@ from __future__ import annotations
 import weakref
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
-from robot_formation.world.camera import Camera, Picture, Sensor
+from robot_formation.world.camera import Camera, Picture
 from robot_formation.world.checks import Command, WorldError, check_command, check_setup
 from robot_formation.world.events import BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose, off_plate
 from robot_formation.world.robot import Robot, RobotStart
+from robot_formation.world.sensor import Development, Sensor
 from robot_formation.world.state import WorldState, restore_physics, save_physics
 
 MAX_FRAMES_OWED = 600
@@ -65,13 +63,13 @@ class World:
         self._check_overlap()
         for robot in self._robots.values():
             robot.settle(lambda: pybullet.stepSimulation(physicsClientId=self._client))
-        self._frame_steps = parameters.physics_hz // parameters.camera.frame_rate_hz
+        self._frame_steps = parameters.physics_hz // parameters.camera.min_frames_per_second
         self._state_steps = parameters.physics_hz // parameters.state_rate_hz
         self._pending: dict[str, Command] = {}
         self._frames_owed = {start.name: 0 for start in robots if start.camera}
         self._camera = Camera(surface, parameters)
         self._sensors = {name: Sensor(parameters.camera, seed, name) for name in self._frames_owed}
-        self._pictures: dict[str, tuple[tuple[Pose, ...], NDArray[np.float32], NDArray[np.float32]]] = {}
+        self._pictures: dict[str, tuple[tuple[Pose, ...], Development]] = {}
 
     # --- asking -----------------------------------------------------------------------------------------------------
 
@@ -191,6 +189,7 @@ class World:
             robot.restore(state.robots[name])
         for name, sensor in self._sensors.items():
             sensor.restore(state.sensors[name])
+        self._pictures.clear()  # they may have been exposed otherwise
         self._frames_owed, self._pending = dict(state.frames_owed), dict(state.pending)
 
     def close(self) -> None:
@@ -266,9 +265,9 @@ class World:
         cached = self._pictures.get(name)
         if cached is None or cached[0] != key:
             light = self._camera.light(poses[name], [pose for other, pose in poses.items() if other != name])
-            cached = (key, light, sensor.sigma(light))
+            cached = (key, sensor.develop(light))
             self._pictures[name] = cached
-        return sensor.expose(cached[1], cached[2])
+        return sensor.expose(cached[1], self.step_count / self.parameters.physics_hz)
 
     # --- checks -----------------------------------------------------------------------------------------------------
 

@@ -1,0 +1,92 @@
+"""ROS messages from the project's values and back. The only place outside nodes/ that knows message packages.
+
+Readers check what comes from outside and raise `MessageError` before anything reaches a model or a wheel.
+"""
+
+from __future__ import annotations
+
+from robot_formation.conversions.basics import (
+    MessageError,
+    clock,
+    diagnostics,
+    from_cdr,
+    header,
+    message_class,
+    stamp_of,
+    string,
+    to_cdr,
+    to_ns,
+    to_time,
+    uint32,
+)
+from robot_formation.conversions.markers import (
+    surface_marker,
+)
+from robot_formation.conversions.motion import (
+    NO_ESTIMATE,
+    body_odometry,
+    displacement,
+    has_estimate,
+    joint_command,
+    joint_states,
+    move,
+    odometry,
+    path,
+    place,
+    pose_array,
+    pose_of,
+    read_displacement,
+    read_joint_command,
+    read_joint_states,
+    read_move,
+    read_pose,
+)
+from robot_formation.conversions.vision import (
+    BLOCK_DTYPE,
+    blocks,
+    camera_info,
+    image,
+    read_blocks,
+    read_grey_image,
+    read_image,
+)
+
+__all__ = [
+    "BLOCK_DTYPE",
+    "NO_ESTIMATE",
+    "MessageError",
+    "blocks",
+    "body_odometry",
+    "camera_info",
+    "clock",
+    "diagnostics",
+    "displacement",
+    "from_cdr",
+    "has_estimate",
+    "header",
+    "image",
+    "joint_command",
+    "joint_states",
+    "message_class",
+    "move",
+    "odometry",
+    "path",
+    "place",
+    "pose_array",
+    "pose_of",
+    "read_blocks",
+    "read_displacement",
+    "read_grey_image",
+    "read_image",
+    "read_joint_command",
+    "read_joint_states",
+    "read_move",
+    "read_pose",
+    "stamp_of",
+    "string",
+    "surface_marker",
+    "to_cdr",
+    "to_ns",
+    "to_time",
+    "uint32",
+]

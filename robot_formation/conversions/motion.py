@@ -1,0 +1,182 @@
+"""Wheels, moves, displacements and poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import JointState
+
+from robot_formation.control.drive import JOINTS, WHEELS, WheelCommand
+from robot_formation.control.motion import Motion
+from robot_formation.conversions.basics import MessageError, header
+
+_LARGEST_WHEEL_ANGLE_RAD = 1e4
+
+
+def joint_command(command: WheelCommand, stamp_ns: int) -> JointState:
+    """Relative wheel angles [rad] as `position`, speed limits [rad/s] as `velocity`; `frame_id` numbers the command.
+
+    `effort` is not used, but filled: rosbags can't read what some CDR writers put behind an empty last list.
+    """
+    return JointState(
+        header=header(stamp_ns, command.number),
+        name=list(WHEELS),
+        position=list(command.angles_rad),
+        velocity=list(command.limits_rad_s),
+        effort=[0.0] * len(WHEELS),
+    )
+
+
+def read_joint_command(message: JointState) -> WheelCommand:
+    """Read relative wheel angles and speed limits in any joint order."""
+    if sorted(message.name) != sorted(WHEELS):
+        raise MessageError(
+            f"joint_commands must name {', '.join(WHEELS)} once each, not {', '.join(message.name) or 'nothing'}"
+        )
+    if len(message.position) != len(WHEELS) or len(message.velocity) != len(WHEELS):
+        raise MessageError(
+            f"joint_commands must have {len(WHEELS)} positions (rad) and {len(WHEELS)} velocities (rad/s)"
+        )
+    order = [list(message.name).index(name) for name in WHEELS]
+    angles = tuple(float(message.position[i]) for i in order)
+    limits = tuple(float(message.velocity[i]) for i in order)
+    if not all(map(math.isfinite, angles + limits)):
+        raise MessageError("joint_commands must be finite")
+    if max(map(abs, angles)) > _LARGEST_WHEEL_ANGLE_RAD:
+        raise MessageError(f"joint_commands are relative angles in rad; {max(map(abs, angles)):.3g} is absurd")
+    return WheelCommand(angles, limits, message.header.frame_id)
+
+
+def joint_states(
+    names: Sequence[str], positions: Sequence[float], velocities: Sequence[float], stamp_ns: int, number: str = ""
+) -> JointState:
+    """Make the joints' report: positions [rad], velocities [rad/s]; `frame_id` is the number of the last command."""
+    return JointState(
+        header=header(stamp_ns, number),
+        name=list(names),
+        position=list(positions),
+        velocity=list(velocities),
+        effort=[0.0] * len(names),
+    )
+
+
+def read_joint_states(message: JointState) -> tuple[list[float], list[float]]:
+    """Read positions [rad] and velocities [rad/s] in the order of `drive.JOINTS`."""
+    index = {name: i for i, name in enumerate(message.name)}
+    missing = [name for name in JOINTS if name not in index]
+    if missing or len(message.position) != len(index) or len(message.velocity) != len(index):
+        raise MessageError(
+            f"joint_states must have one position and one velocity of each joint ({', '.join(JOINTS)}); "
+            f"missing: {', '.join(missing) or 'values'}"
+        )
+    positions = [float(message.position[index[name]]) for name in JOINTS]
+    velocities = [float(message.velocity[index[name]]) for name in JOINTS]
+    if not all(map(math.isfinite, positions + velocities)):
+        raise MessageError("joint_states must be finite")
+    return positions, velocities
+
+
+def _set_planar(pose: Pose, motion: Motion) -> None:
+    pose.position.x, pose.position.y = motion.x_m, motion.y_m
+    pose.orientation.z, pose.orientation.w = math.sin(motion.yaw_rad / 2.0), math.cos(motion.yaw_rad / 2.0)
+
+
+def move(motion: Motion, frame: str, stamp_ns: int) -> PoseStamped:
+    """Make a move's target in the robot's `base_link`."""
+    message = PoseStamped(header=header(stamp_ns, frame))
+    _set_planar(message.pose, motion)
+    return message
+
+
+def read_pose(pose: Pose) -> Motion:
+    """Read a planar displacement: x, y and yaw. Not-finite values are kept for the core to refuse."""
+    o = pose.orientation
+    # A quaternion of any length gives its yaw; atan2 would make a number of infinite components.
+    yaw = math.atan2(2.0 * (o.w * o.z + o.x * o.y), o.w * o.w + o.x * o.x - o.y * o.y - o.z * o.z)
+    if not all(map(math.isfinite, (o.x, o.y, o.z, o.w))):
+        yaw = math.nan
+    return Motion(float(pose.position.x), float(pose.position.y), yaw)
+
+
+def read_move(message: PoseStamped) -> Motion:
+    """Read a move's target."""
+    return read_pose(message.pose)
+
+
+def displacement(
+    motion: Motion, frame: str, stamp_ns: int, covariance_xy: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
+) -> PoseWithCovarianceStamped:
+    """Make a displacement with the covariance of (x, y), row by row [m^2]; a negative first one means 'no estimate'."""
+    message = PoseWithCovarianceStamped(header=header(stamp_ns, frame))
+    _set_planar(message.pose.pose, motion)
+    covariance = np.zeros((6, 6))
+    covariance[:2, :2] = np.reshape(covariance_xy, (2, 2))
+    message.pose.covariance = covariance.ravel()
+    return message
+
+
+NO_ESTIMATE = (-1.0, 0.0, 0.0, 0.0)
+
+
+def read_displacement(message: PoseWithCovarianceStamped) -> Motion:
+    """Read a displacement's mean."""
+    return read_pose(message.pose.pose)
+
+
+def has_estimate(message: PoseWithCovarianceStamped) -> bool:
+    """Tell whether a displacement was estimated at all."""
+    return float(message.pose.covariance[0]) >= 0.0
+
+
+def odometry(motion: Motion, frame: str, child: str, stamp_ns: int) -> Odometry:
+    """Make planar odometry."""
+    message = Odometry(header=header(stamp_ns, frame), child_frame_id=child)
+    _set_planar(message.pose.pose, motion)
+    return message
+
+
+def body_odometry(
+    position: Sequence[float],
+    quaternion_xyzw: Sequence[float],
+    linear: Sequence[float],
+    angular: Sequence[float],
+    *,
+    frame: str,
+    child: str,
+    stamp_ns: int,
+) -> Odometry:
+    """Make a full pose in `frame`; velocities are in the child frame, as nav_msgs/Odometry asks."""
+    message = Odometry(header=header(stamp_ns, frame), child_frame_id=child)
+    p, o, twist = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist
+    p.x, p.y, p.z = map(float, position)
+    o.x, o.y, o.z, o.w = map(float, quaternion_xyzw)
+    twist.linear.x, twist.linear.y, twist.linear.z = map(float, linear)
+    twist.angular.x, twist.angular.y, twist.angular.z = map(float, angular)
+    return message
+
+
+def pose_of(odometry_message: Odometry) -> PoseStamped:
+    """Take the pose out of an odometry message."""
+    return PoseStamped(header=odometry_message.header, pose=odometry_message.pose.pose)
+
+
+def place(position: Sequence[float], frame: str, stamp_ns: int) -> PoseStamped:
+    """Make a pose of which only the place (x, y, z) is known: its orientation is the frame's."""
+    message = PoseStamped(header=header(stamp_ns, frame))
+    p = message.pose.position
+    p.x, p.y, p.z = map(float, position)
+    return message
+
+
+def pose_array(poses: Sequence[PoseStamped], frame: str, stamp_ns: int) -> PoseArray:
+    """Make one message of several poses."""
+    return PoseArray(header=header(stamp_ns, frame), poses=[stamped.pose for stamped in poses])
+
+
+def path(poses: Sequence[PoseStamped], frame: str, stamp_ns: int) -> Path:
+    """Make a path."""
+    return Path(header=header(stamp_ns, frame), poses=list(poses))
