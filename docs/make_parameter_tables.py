@@ -17,8 +17,8 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment.scenario import node_defaults
 from robot_formation.nodes.parameters import HostParameters
-from robot_formation.nodes.player import PlayerParameters
-from robot_formation.nodes.recorder import RecorderParameters
+from robot_formation.nodes.playing import PlayerParameters
+from robot_formation.nodes.recording import RecorderParameters
 from robot_formation.parameters import Spec, specs
 
 PAGES = Path(__file__).parent / "nodes"

@@ -112,7 +112,6 @@ def test_so_do_those_of_a_split_bag(tmp_path):
     kill_and_recover(tmp_path, 100, split_bytes=20_000)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("lines", moments(20, seed=2))
 def test_sigkill_at_twenty_moments(tmp_path, lines):
     kill_and_recover(tmp_path, lines, split_bytes=random.Random(lines).choice([0, 50_000]))

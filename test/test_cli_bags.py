@@ -11,8 +11,8 @@ from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.writer import BagWriter
 from robot_formation.cli.main import main
 from robot_formation.experiment.scenario import node_defaults
-from robot_formation.nodes.player import PlayerParameters
-from robot_formation.nodes.recorder import RecorderParameters
+from robot_formation.nodes.playing import PlayerParameters
+from robot_formation.nodes.recording import RecorderParameters
 from robot_formation.parameters import specs, to_mapping
 
 STRING = "std_msgs/msg/String"

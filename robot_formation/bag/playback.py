@@ -112,6 +112,11 @@ class Playhead:
             self._bag_ns, self._wall_s = self.time_ns(now_s), now_s
             self.paused = paused
 
+    def set_rate(self, rate: float, now_s: float) -> None:
+        """Go on at another rate."""
+        self._bag_ns, self._wall_s = self.time_ns(now_s), now_s
+        self._rate = rate
+
     def jump(self, stamp_ns: int, now_s: float) -> None:
         """Set the bag time: a single step in a pause, or the beginning of another round."""
         self._bag_ns, self._wall_s = stamp_ns, now_s

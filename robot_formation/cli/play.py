@@ -13,7 +13,7 @@ from robot_formation import exit_codes
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.nodes.player import PlayerParameters, PlayReport
+    from robot_formation.nodes.playing import PlayerParameters, PlayReport
 
 DESCRIPTION = """\
 Publish the messages of a bag (ours, or one of 'ros2 bag', MCAP or SQLite) when they are due, with the quality of
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         if bag.recovered:
             _say(f"{args.bag} was not closed: what can be saved of it is played")
         selection.check(bag.topics, args.bag)
-        from robot_formation.nodes.player import PlayerNode
+        from robot_formation.nodes.playing import PlayerNode
         from robot_formation.nodes.session import Interrupts, node_session
 
         parameters = _parameters(args)
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _parameters(args: argparse.Namespace) -> PlayerParameters:
-    from robot_formation.nodes.player import PlayerParameters
+    from robot_formation.nodes.playing import PlayerParameters
     from robot_formation.parameters import from_mapping
 
     values = {

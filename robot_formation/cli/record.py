@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.nodes.recorder import RecorderParameters, RecordReport
+    from robot_formation.nodes.recording import RecorderParameters, RecordReport
 
 DESCRIPTION = """\
 Record topics of the ROS graph (ROS_DOMAIN_ID and the like count) into an MCAP bag until Ctrl-C. Topics that appear
@@ -91,7 +91,7 @@ def default_bag() -> Path:
 
 def _record(args: argparse.Namespace, path: Path) -> RecordReport:
     from robot_formation.bag.provenance import git_commit, versions
-    from robot_formation.nodes.recorder import RecorderNode
+    from robot_formation.nodes.recording import RecorderNode
     from robot_formation.nodes.session import Interrupts, node_session
 
     texts = {"versions": json.dumps(versions()), "git_commit": git_commit()}
@@ -103,7 +103,7 @@ def _record(args: argparse.Namespace, path: Path) -> RecordReport:
 
 
 def _parameters(args: argparse.Namespace, path: Path, metadata: tuple[str, ...]) -> RecorderParameters:
-    from robot_formation.nodes.recorder import RecorderParameters
+    from robot_formation.nodes.recording import RecorderParameters
     from robot_formation.parameters import from_mapping
 
     values = {
