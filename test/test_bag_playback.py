@@ -45,6 +45,17 @@ def test_a_step_in_a_pause_takes_bag_time_along():
     assert head.wait_s(8 * SECOND, 10.0) == 1.0
 
 
+def test_another_rate_counts_from_now_on_also_in_a_pause():
+    head = Playhead(1.0, 0, 0.0)
+    head.set_rate(4.0, 2.0)
+    assert head.wait_s(10 * SECOND, 2.0) == 2.0
+    head.pause(True, 3.0)
+    head.set_rate(1.0, 50.0)
+    assert head.time_ns(60.0) == 6 * SECOND
+    head.pause(False, 70.0)
+    assert head.wait_s(10 * SECOND, 70.0) == 4.0
+
+
 def test_schedule_errors_are_summarised_honestly():
     errors = ScheduleErrors()
     assert errors.summary_ms() is None

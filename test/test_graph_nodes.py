@@ -44,7 +44,13 @@ class Lab:
     def start(self, name, *arguments, namespace="/"):
         command = [sys.executable, "-m", f"robot_formation.nodes.{name}", "--ros-args", "-r", f"__ns:={namespace}"]
         process = subprocess.Popen(
-            [*command, *arguments], env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*command, *arguments],
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
         )
         self.processes.append(process)
         return process
@@ -162,6 +168,16 @@ def test_a_node_ends_cleanly_on_signals(lab, tmp_path, name):
         if name == "recorder":
             (tmp_path / "bag").rename(tmp_path / f"bag_{number}")
         lab.until(lambda: (name, namespace) not in lab.node.get_node_names_and_namespaces())
+
+
+def test_ctrl_c_while_a_node_still_starts_is_not_lost(tmp_path):
+    early = "import os, signal; from robot_formation.nodes import signals, leader; take = signals.stop_on_signals"
+    code = f"{early}; leader.stop_on_signals = lambda: (take(), os.kill(os.getpid(), signal.SIGINT))"
+    command = [sys.executable, "-c", f"{code}; raise SystemExit(leader.main())", "--ros-args", "-r", "__ns:=/leader"]
+    with DomainReservation() as domain:
+        environment = node_environment(domain, tmp_path)
+        completed = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert (completed.returncode, completed.stderr) == (0, "")
 
 
 def test_strangers_drive_a_robot_and_its_camera_in_a_world_of_their_own(lab, tmp_path):
