@@ -43,9 +43,14 @@ class Lab:
 
     def start(self, name, *arguments, namespace="/"):
         command = [sys.executable, "-m", f"robot_formation.nodes.{name}", "--ros-args", "-r", f"__ns:={namespace}"]
+        return self.open([*command, *arguments], self.environment)
+
+    def open(self, command, environment, cwd=None):
+        """Start a process in a session of its own, as a terminal would."""
         process = subprocess.Popen(
-            [*command, *arguments],
-            env=self.environment,
+            command,
+            env=environment,
+            cwd=cwd,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
