@@ -20,16 +20,21 @@ from robot_formation.cli import (
     info,
     list_,
     play,
+    predict,
     record,
     recover,
     replay,
     run,
+    sweep,
     teach,
     test,
 )
 from robot_formation.errors import FormationError
 
-VERBS = (run, list_, analyze, record, play, info, recover, replay, calibrate, teach, detect, doctor, test)
+VERBS = (
+    *(run, sweep, list_, analyze, predict, record, play, info, recover, replay),
+    *(calibrate, teach, detect, doctor, test),
+)
 
 EPILOG = """\
 exit codes: 0 done, 2 usage or bad input, 3 leader lost or plate left, 4 a node died, 130 interrupted

@@ -62,10 +62,13 @@ class RequestFrames:
 
 @dataclass(frozen=True)
 class Report:
-    """The timestep's net displacement and what is left by the camera's estimate (None: Target face not seen)."""
+    """The timestep's net displacement, what is left by the camera's estimate (None: Target face not seen), and what the
+    displacement would have been had the prediction move gone as commanded (None: its end is unknown).
+    """
 
     displacement: Motion
     residual: Motion | None
+    commanded: Motion | None
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,8 @@ class FineTuner:
         self._displacement = Motion()
         self._previous = Motion()
         self._prediction: Motion | None = None
+        self._planned_move: Motion | None = None  # the prediction move, until it has ended
+        self._actuation_error: Motion | None = None
         self._frames: list[Sequence[Block]] = []
         self._frames_wanted = 0
         self._extensions = 0
@@ -140,11 +145,14 @@ class FineTuner:
         if self._phase is not Phase.MOVE:
             return [Warn("a 'moved' that nobody asked for is ignored")]
         self.stamp_ns = stamp_ns
+        planned, self._planned_move = self._planned_move, None
         if not motion.finite:
             return [
                 Warn("a 'moved' that is not finite is ignored: the displacement of this move is lost"),
                 *self._look(),
             ]
+        if planned is not None:
+            self._actuation_error = Motion(motion.x_m - planned.x_m, motion.y_m - planned.y_m)
         self._displacement = self._displacement.then(motion)
         return self._look()
 
@@ -179,6 +187,7 @@ class FineTuner:
             return []
         self._alignment = PaperAlignment(self._p.alignment)
         self._displacement = Motion()
+        self._actuation_error = None
         if self.timestep == 0:
             return [State("align"), *self._look()]
         self._phase = Phase.MOVE
@@ -186,6 +195,7 @@ class FineTuner:
         motion = Motion.from_uv(
             max(-self._p.max_u_m, min(self._p.max_u_m, wish.u_m)), max(-self._p.max_v_m, min(self._p.max_v_m, wish.v_m))
         )
+        self._planned_move = motion
         collecting = self.timestep <= COLLECTION_TIMESTEPS
         actions: list[Action] = [State("collect" if collecting else "predict"), SendMove(motion)]
         if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
@@ -228,7 +238,10 @@ class FineTuner:
             return [*actions, *self._finish()]
         self._phase = Phase.PREDICTION
         self._previous = Motion(self._displacement.x_m, self._displacement.y_m)
-        return [*actions, Report(self._displacement, self._alignment.offset(blocks))]
+        commanded = None
+        if (error := self._actuation_error) is not None:
+            commanded = Motion(self._displacement.x_m - error.x_m, self._displacement.y_m - error.y_m)
+        return [*actions, Report(self._displacement, self._alignment.offset(blocks), commanded)]
 
     def _finish(self) -> list[Action]:
         finished = self.timestep
