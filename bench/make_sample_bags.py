@@ -39,7 +39,7 @@ class Sample:
 
     def scenario(self) -> Scenario:
         """Put the run together."""
-        common = (f"seed={SEED}", "world.camera.mode=on_demand")
+        common = (f"seed={SEED}", "world.camera.mode=on_demand", "fine_tuner.mode=paper")
         scenario = scenarios.override(scenarios.load_track(self.track), [*common, *self.settings])
         scenario.check()
         return scenario

@@ -31,6 +31,17 @@ def run(tmp_path_factory):
     return bag
 
 
+@pytest.fixture(scope="module")
+def formation_run(tmp_path_factory):
+    """The bag of a short run with a predictor that uses everything it can hear, and keeps its state."""
+    folder = tmp_path_factory.mktemp("replay")
+    settings = ["seed=3", f"leader.timesteps={TIMESTEPS}", "world.camera.mode=on_demand", "predictor.name=formation"]
+    state = f"predictor.state_file={folder / '{robot}.json'}"
+    scenario = scenarios.override(scenarios.load_track("one"), [*settings, state, "predictor.load_state=true"])
+    run_in_process(scenario, folder / "run", run_metadata(scenario))
+    return folder / "run"
+
+
 @pytest.fixture
 def recording(run):
     with read_bag(run) as bag:
@@ -56,6 +67,29 @@ def test_the_same_parameters_give_the_same_answers(recording, replay):
     assert found.identical
     assert found.changed == 0
     assert len(found.rows) >= TIMESTEPS
+
+
+def test_a_predictor_gets_what_was_commanded_too_and_its_state_file_is_left_alone(formation_run, tmp_path):
+    state = formation_run.parent / "follower_1.json"
+    before = state.read_bytes()
+    with read_bag(formation_run) as bag:
+        formation = Recording(bag)
+        (found,) = replay_predictor(formation, {})
+    assert found.identical
+    assert len(found.rows) == TIMESTEPS
+    assert state.read_bytes() == before
+    assert [note for note in formation.notes if "state file" in note]
+    with read_bag(copied(formation_run, tmp_path / "bag", without=("/follower_1/commanded",))) as bag:
+        (deaf,) = replay_predictor(Recording(bag), {})
+    assert deaf.changed > 0
+
+
+def test_a_replay_goes_on_from_a_state_file_if_told(formation_run):
+    state = str(formation_run.parent / "{robot}.json")
+    with read_bag(formation_run) as bag:
+        (found,) = replay_predictor(Recording(bag), {"state_file": state, "load_state": True})
+    assert found.changed > 0
+    assert found.rows[1].today is not None
 
 
 @pytest.mark.parametrize("replay", [replay_predictor, replay_fine_tuner])

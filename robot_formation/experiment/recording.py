@@ -53,6 +53,14 @@ class Recording:
         for message in self._bag.raw_messages([name]):
             yield conversions.from_cdr(message.cdr, topic.type)
 
+    def any_messages(self, robot: str, topic: names.Topic) -> list[Any]:
+        """List the messages of a robot's topic; none if it wasn't recorded.
+
+        Raises:
+            BagError: they have another type, or the bag is corrupted.
+        """
+        return list(self.messages(robot, topic)) if self.has(robot, topic) else []
+
     def parameters(self, kind: str, changes: dict[str, Any]) -> Any:
         """Make a node's parameter object: as recorded, with some changed.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from robot_formation import conversions, names
@@ -51,7 +51,9 @@ class PredictionReplay:
 
 
 def replay_predictor(recording: Recording, changes: dict[str, Any]) -> list[PredictionReplay]:
-    """Show every follower's displacements and residuals to today's predictor.
+    """Show every follower's displacements, residuals and commanded distances to today's predictor.
+
+    It begins knowing nothing and keeps no state, whatever the recorded one did, unless `changes` name a state file.
 
     Args:
         recording: the run.
@@ -62,16 +64,24 @@ def replay_predictor(recording: Recording, changes: dict[str, Any]) -> list[Pred
         ParameterError: a change can't be.
     """
     parameters = recording.parameters("predictor", changes)
+    if "state_file" not in changes:
+        if parameters.load_state and "load_state" not in changes:
+            recording.notes.append("the recorded predictor went on from its state file: the replay begins without it")
+        parameters = replace(parameters, state_file="", load_state=changes.get("load_state", False))
     return [_replay_predictor(recording, robot, parameters) for robot in recording.followers]
 
 
 def _replay_predictor(recording: Recording, robot: str, parameters: Any) -> PredictionReplay:
     displacements = list(recording.messages(robot, names.DISPLACEMENT))
     residuals = list(recording.messages(robot, names.RESIDUAL))
-    recorded = list(recording.messages(robot, names.PREDICTION)) if recording.has(robot, names.PREDICTION) else []
+    commanded = _by_stamp(recording.any_messages(robot, names.COMMANDED))
+    recorded = recording.any_messages(robot, names.PREDICTION)
     component, sent = host("predictor", parameters, robot, recording.notes)
     take = handlers(component)
     for displacement, residual in zip(displacements, residuals, strict=False):
+        command = commanded.get(conversions.stamp_of(displacement))
+        if command is not None:
+            take[names.COMMANDED.name](command)
         take[names.DISPLACEMENT.name](displacement)
         take[names.RESIDUAL.name](residual)
     today = [message for _, message in sent]
@@ -138,7 +148,7 @@ def replay_detector(recording: Recording, changes: dict[str, Any]) -> list[Detec
 
 
 def _replay_detector(recording: Recording, robot: str, parameters: Any) -> DetectionReplay:
-    recorded = list(recording.messages(robot, names.BLOCKS)) if recording.has(robot, names.BLOCKS) else []
+    recorded = recording.any_messages(robot, names.BLOCKS)
     component, sent = host("block_detector", parameters, robot, recording.notes)
     take = handlers(component)[names.camera_image().name]
     stamps = []

@@ -111,9 +111,7 @@ class _Driver:
     def __init__(self, recording: Recording, robot: str, parameters: Any) -> None:
         self._robot = robot
         self._tick = names.formation_done(names.beacon_neighbour(robot)).name
-        self._recorded = {
-            topic.name: list(recording.messages(robot, topic)) if recording.has(robot, topic) else [] for topic in _SENT
-        }
+        self._recorded = {topic.name: recording.any_messages(robot, topic) for topic in _SENT}
         self._timesteps = _split(self._recorded)
         self._scripts = _scripts(recording, robot, self._timesteps, self._recorded)
         self._notes = recording.notes
@@ -218,9 +216,7 @@ def _scripts(
     ticks = list(recording.messages(robot, names.formation_done(names.beacon_neighbour(robot))))
     moved = deque(recording.messages(robot, names.MOVED))
     blocks = deque(recording.messages(robot, names.BLOCKS))
-    predictions = (
-        deque(recording.messages(robot, names.PREDICTION)) if recording.has(robot, names.PREDICTION) else deque()
-    )
+    predictions = deque(recording.any_messages(robot, names.PREDICTION))
     ends = [conversions.stamp_of(message) for message in recorded[names.DISPLACEMENT.name]]
     found = []
     for number, (decisions, tick) in enumerate(zip(timesteps, ticks, strict=False)):
