@@ -91,9 +91,11 @@ def test_a_nodes_page_names_its_services_and_diagnostics(kind):
         assert f"`{name}`" in page
 
 
-@pytest.mark.parametrize(("node", "module"), [("recorder", "recording"), ("player", "playing")])
-def test_the_pages_of_recorder_and_player_name_what_these_make_beside_a_bags_topics(node, module):
-    code = (ROOT / "robot_formation" / "nodes" / f"{module}.py").read_text()
+@pytest.mark.parametrize(
+    ("node", "modules"), [("recorder", ("recording", "recorder_health")), ("player", ("playing",))]
+)
+def test_the_pages_of_recorder_and_player_name_what_these_make_beside_a_bags_topics(node, modules):
+    code = "".join((ROOT / "robot_formation" / "nodes" / f"{module}.py").read_text() for module in modules)
     page = (NODE_PAGES / f"{node}.md").read_text()
     for kind, name in re.findall(r'create_service\((\w+), "([^"]+)"', code):
         assert f"| `{name}` | std_srvs/srv/{kind} |" in page

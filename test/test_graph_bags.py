@@ -14,7 +14,7 @@ from std_msgs.msg import String, UInt32
 from std_srvs.srv import SetBool, Trigger
 from synthetic_bag import STORE, text
 from test_bag_death import limit_file_size, ticks_in_finished_chunks, ticks_of
-from test_graph_nodes import DEADLINE_S, Lab
+from test_graph_nodes import DEADLINE_S, Lab, values_of
 
 from robot_formation import conversions, names
 from robot_formation.bag.qos import TopicQos
@@ -157,6 +157,33 @@ def test_topics_are_chosen_discovered_late_and_those_that_never_come_are_told(la
         assert json.loads(details["parameters of /stranger"])["use_sim_time"] is False
         assert "robot_formation" in json.loads(details["versions"])
         assert bag.contents[0].type_hash == STORE.hash_rihs01(STRING)
+
+
+def test_the_recorder_tells_how_it_goes_and_keeps_that_out_of_its_bag(lab, tmp_path):
+    heard = lab.collect(names.DIAGNOSTICS)
+    recorder = lab.record("--all", "-o", tmp_path / "bag")
+    publisher = lab.node.create_publisher(UInt32, "/tick", RELIABLE)
+    lab.until(publisher.get_subscription_count)
+    publisher.publish(UInt32(data=1))
+
+    def told(key):
+        return [value.value for value in values_of(heard, "recorder") if value.key == key]
+
+    lab.until(lambda: told("messages")[-1:] == ["1"])
+    assert told("topics")[-1] == "1"
+    assert set(told("dropped")) == set(told("lost")) == {"0"}
+    assert all(array.status[0].level == b"\x00" for array in heard)
+    # Other nodes' reports on the same topic are recorded, those of the recorder among them are not.
+    stranger = lab.publisher(names.DIAGNOSTICS)
+    lab.until(lambda: stranger.get_subscription_count() == 2)
+    report = conversions.diagnostics("stranger", 0, "well", {}, 5)
+    stranger.publish(report)
+    before = len(heard)
+    lab.until(lambda: len(heard) > before + 2)
+    assert lab.end(recorder)["topics"] == {"/tick": 1, "/diagnostics": 1}
+    with read_bag(tmp_path / "bag") as bag:
+        (message,) = bag.messages(["/diagnostics"])
+    assert message.message.status[0].name == "stranger"
 
 
 def flood(lab, publisher, enough):

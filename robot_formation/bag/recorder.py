@@ -48,6 +48,11 @@ class Recorder:
         return self._topics
 
     @property
+    def now_ns(self) -> int:
+        """The latest stamp so far, nanoseconds: that of messages that have none of their own."""
+        return self._now_ns
+
+    @property
     def message_count(self) -> int:
         """Messages recorded so far."""
         return self._writer.message_count

@@ -29,6 +29,7 @@ from robot_formation.bag.writer import WriteOptions
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.parameter_snapshot import ParameterSnapshot
 from robot_formation.nodes.parameters import HostParameters, ParameterNode, declare
+from robot_formation.nodes.recorder_health import RecorderHealth
 from robot_formation.nodes.signals import stopped
 from robot_formation.nodes.topic_qos import accepting, accepts, offered
 from robot_formation.parameters import ParameterError, parameter
@@ -155,6 +156,7 @@ class RecorderNode:
         self._chunk_at = time.monotonic()
         self._tick_at: float | None = None
         self._snapshot = ParameterSnapshot(node, self._keep) if ask else None
+        self._health = RecorderHealth(node, parameters.path)
 
     def run(self, stop: Callable[[], bool] = stopped) -> RecordReport:
         """Record until `stop` says so; then take what is still on its way and close the bag.
@@ -218,6 +220,7 @@ class RecorderNode:
                 self._ignored.add(name)
                 continue
             infos = self._node.get_publishers_info_by_topic(name)
+            infos = [info for info in infos if not self._health.publishes(info.node_name, info.node_namespace)]
             if infos:
                 self._subscribe(name, types, infos)
 
@@ -249,6 +252,8 @@ class RecorderNode:
         self._say(f"recording {name} ({type_name})")
 
     def _on_message(self, topic: str, type_name: str, data: bytes) -> None:
+        if self._health.is_own(topic, data):
+            return
         self._messages += 1
         self._queue.put(topic, type_name, data, time.time_ns() if self._receive_time else None)
         if type_name == _TICK_TYPE:
@@ -261,7 +266,7 @@ class RecorderNode:
         self._queue.call(partial(self._recorder.write_metadata, {key: text}))
 
     def _review(self) -> None:
-        """Tell what is dropped, and which publishers the subscriptions made so far don't reach."""
+        """Tell how it goes, and which publishers the subscriptions made so far don't reach."""
         if self._snapshot is not None:
             self._snapshot.look()
         for name, profile in self._subscribed.items():
@@ -274,6 +279,10 @@ class RecorderNode:
         if dropped > self._told_dropped:
             self._warn(f"{dropped} messages dropped: the disk is too slow for 'queue_bytes'")
             self._told_dropped = dropped
+        queue = self._queue
+        self._health.publish(
+            self._recorder.now_ns, self._messages, len(self._subscribed), queue.waiting_bytes, queue.dropped, self._lost
+        )
 
 
 class Executable:
