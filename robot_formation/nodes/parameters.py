@@ -77,7 +77,7 @@ class ParameterNode(Node):
             item = _like(current, given)
             if not self.describe_parameter(item.name).read_only:
                 changes.append(item)
-            elif item.value != current.value:
+            elif _bare(item.value) != _bare(current.value):
                 reason = self.fixed.get(item.name, AT_START)
                 return _refused(f"'{item.name}' can't be set while {self.get_name()} runs: {reason}")
         return super().set_parameters_atomically(changes) if changes else SetParametersResult(successful=True)
@@ -85,6 +85,11 @@ class ParameterNode(Node):
 
 def _refused(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=False, reason=reason)
+
+
+def _bare(value: Any) -> Any:
+    """Make a list of the array that a message holds numbers in: an array equals no list."""
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _like(current: Parameter, given: Parameter) -> Parameter:
@@ -169,8 +174,7 @@ def _plain(spec: Spec, value: Any) -> Any:
     """Undo what YAML and rcl make of values: 1 where 1.0 is meant, array('d') where a list is, nothing of [ ]."""
     if value is None and isinstance(spec.default, tuple):
         return []
-    if hasattr(value, "tolist"):
-        value = value.tolist()
+    value = _bare(value)
     if spec.type is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     return list(value) if isinstance(value, (list, tuple)) else value
