@@ -184,9 +184,9 @@ def test_a_file_says_only_what_differs_and_is_called_like_itself(write):
 
 
 def test_an_override_beats_the_file_which_beats_config_which_beats_the_code(write):
-    path = write("predictor:\n  forgetting: 0.9\n  sigma_m: 0.001\n")
+    path = write("predictor:\n  forgetting: 0.9\n  sigma_u_m: 0.001\n")
     found = override(load(path), ["predictor.forgetting=0.8"]).parameters("predictor")
-    assert (found["forgetting"], found["sigma_m"], found["max_u_m"]) == (0.8, 0.001, 0.1)
+    assert (found["forgetting"], found["sigma_u_m"], found["max_u_m"]) == (0.8, 0.001, 0.1)
     assert load(path).parameters("block_detector")["block_filtering"] == 40
     assert KINDS["block_detector"].parameter_class()().block_filtering == 3
 

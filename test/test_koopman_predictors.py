@@ -211,15 +211,16 @@ def test_asking_twice_changes_nothing_and_the_answer_is_the_askers(name):
 # --- covariance -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("discount", [1.0, 0.8])
 @pytest.mark.parametrize("known", [False, True], ids=["without residuals", "with residuals"])
-def test_the_covariance_is_the_mean_square_of_the_forecasts_own_errors_and_of_sigma(name, known):
-    found = predictor(name, sigma_u_m=0.004, sigma_v_m=0.003, sigma_weight=2.5)
+def test_the_covariance_is_the_mean_square_of_the_forecasts_own_errors_and_of_sigma(name, known, discount):
+    found = predictor(name, sigma_u_m=0.004, sigma_v_m=0.003, sigma_weight=2.5, sigma_discount=discount)
     total, weight, expected = np.diag([0.004, 0.003]) ** 2 * 2.5, 2.5, None
     for x, r, c in timesteps(20):
         r = r if known else None
         if expected is not None:
             error = (x if r is None else x + r) - expected  # of the ideal move, where it is known
-            total, weight = total + np.outer(error, error), weight + 1.0
+            total, weight = discount * total + np.outer(error, error), discount * weight + 1.0
         found.observe(x, r, c)
         expected = found.predict().mean
         assert found.predict().covariance == pytest.approx(total / weight, abs=1e-18)

@@ -123,17 +123,21 @@ def _reductions(runs: dict[int, RunRow], baseline: dict[int, RunRow]) -> list[fl
 
 def _ratios(runs: dict[int, RunRow], others: dict[int, RunRow]) -> list[float]:
     """Pair C / C_other of the seeds that both have; a lost run is infinitely worse, against a lost one it is 0."""
-    return [_ratio(runs[seed], others[seed]) for seed in runs if seed in others]
+    pairs = [(_rank(runs[seed]), _rank(others[seed])) for seed in runs if seed in others]
+    return [_ratio(own, other) for own, other in pairs if own is not None and other is not None]
 
 
-def _ratio(run: RunRow, other: RunRow) -> float:
-    if run.lost or run.correction_m is None:
+def _rank(run: RunRow) -> float | None:
+    """Correction distance in metres; infinite for a lost run, None for one that ended before any was counted."""
+    return math.inf if run.lost else run.correction_m
+
+
+def _ratio(own_m: float, other_m: float) -> float:
+    if math.isinf(own_m):
         return math.inf
-    if other.lost or other.correction_m is None:
-        return 0.0
-    if other.correction_m == 0.0:
-        return 1.0 if run.correction_m == 0.0 else math.inf
-    return run.correction_m / other.correction_m
+    if other_m == 0.0:
+        return 1.0 if own_m == 0.0 else math.inf
+    return own_m / other_m
 
 
 def table(summary: Sequence[dict[str, Any]]) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import json
 import logging
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass, fields
@@ -150,12 +151,15 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
         run = f"track {task.track}, surface {task.surface}, predictor {task.predictor}, seed {task.seed}"
         raise SweepError(f"{run}: {error}") from None
     totals = analysis.followers[0].totals
-    names = [field.name for field in fields(Row)][6:]
+    # A sum of nothing is an integer 0, which the table would give back as another text.
+    quantities: dict[str, Any] = {
+        field.name: None if totals[field.name] is None else float(totals[field.name]) for field in fields(Row)[6:]
+    }
     return Row(
         *task,
         outcome=analysis.outcome,
         timesteps=totals["timesteps_finished"],
-        **{name: totals[name] for name in names},
+        **quantities,
     )
 
 
@@ -175,7 +179,9 @@ class Table:
         elif folder.exists() and any(folder.iterdir()):
             raise SweepError(f"{folder} is not empty and holds no sweep; choose another --out")
         folder.mkdir(parents=True, exist_ok=True)
-        record.write_text(json.dumps(asdict(plan), indent=2) + "\n", encoding="utf-8")
+        unfinished = record.with_suffix(".partial")
+        unfinished.write_text(json.dumps(asdict(plan), indent=2) + "\n", encoding="utf-8")
+        unfinished.replace(record)
         self.rows: dict[Task, Row] = {}
         if self._path.exists():
             self.rows = {row.task: row for row in read_rows(self._path)}
@@ -197,10 +203,10 @@ class Table:
     def _require_same(record: Path, plan: Plan) -> None:
         try:
             earlier = json.loads(record.read_text(encoding="utf-8"))
-            settings = earlier["settings"]
+            settings = list(earlier["settings"])
         except (OSError, ValueError, KeyError, TypeError):
             raise SweepError(f"{record}: no record of a sweep; choose another --out") from None
-        if list(settings) != list(plan.settings):
+        if settings != list(plan.settings):
             raise SweepError(f"{record.parent} holds a sweep with other settings ({settings}); choose another --out")
 
 
@@ -217,15 +223,17 @@ def read_rows(path: Path) -> Iterator[Row]:
     except (OSError, ValueError) as error:
         raise SweepError(f"{path}: can't read it: {error}") from None
     # A number that was cut off is a number too: only a line with its end is whole.
-    reader = csv.reader(line for line in lines if line.endswith("\n"))
-    if next(reader, None) != list(columns):
+    whole = [line for line in lines if line.endswith("\n")]
+    if not whole or whole[0].rstrip() != ",".join(columns):
         raise SweepError(f"{path}: no table of a sweep's runs; choose another --out")
-    for cells in reader:
-        try:
+    reader = csv.reader(whole)
+    next(reader)
+    try:
+        for cells in reader:
             pairs = zip(columns.items(), cells, strict=True)
             yield Row(**{name: _value(kind, cell) for (name, kind), cell in pairs})
-        except ValueError:
-            raise SweepError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
+    except (ValueError, csv.Error):
+        raise SweepError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
 
 
 def remaining(plan: Plan, rows: Mapping[Task, Row]) -> list[Task]:
@@ -269,7 +277,8 @@ def carry_out_by_dask(tasks: Iterable[Task], settings: Sequence[str], scheduler:
     try:
         client = Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:
-        raise SweepError(f"no Dask scheduler answers at {scheduler}: {str(error).splitlines()[0]}") from None
+        reason = str(error).partition("\n")[0] or type(error).__name__
+        raise SweepError(f"no Dask scheduler answers at {scheduler}: {reason}") from None
     with client:
         for future in as_completed(client.map(partial(run_task, settings=settings), list(tasks), pure=False)):
             if future.cancelled():
@@ -291,4 +300,8 @@ def _value(kind: str, text: str) -> Any:
         return text
     if kind == "int":
         return int(text)
-    return float(text) if text else None
+    if not text:
+        return None
+    if not math.isfinite(number := float(text)):
+        raise ValueError(text)
+    return number

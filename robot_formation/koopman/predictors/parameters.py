@@ -165,6 +165,9 @@ class PredictorParameters:
         0.0025, "Standard deviation of a forecast along v before errors tell", unit="m", low=0.0, high=1.0
     )
     sigma_weight: float = parameter(2.0, "How many forecasts these standard deviations count for", low=0.01, high=1e6)
+    sigma_discount: float = parameter(
+        0.9, "Weight of a past forecast's error in the covariance relative to the next newer one", low=0.01, high=1.0
+    )
     state_file: str = parameter(
         "", "File that keeps what was learned, so that a restarted node goes on; {robot} is its robot; empty: none"
     )

@@ -139,10 +139,11 @@ class Predictor:
                 u, v = u + residual_u, v + residual_v
             expected_u, expected_v = self._expected.tolist()
             error_u, error_v = u - expected_u, v - expected_v
-            self._uu += error_u * error_u
-            self._uv += error_u * error_v
-            self._vv += error_v * error_v
-            self._weight += 1.0
+            keep = self.parameters.sigma_discount
+            self._uu = keep * self._uu + error_u * error_u
+            self._uv = keep * self._uv + error_u * error_v
+            self._vv = keep * self._vv + error_v * error_v
+            self._weight = keep * self._weight + 1.0
         self.observations += 1
         self._expected = self._bounded(mean)
 

@@ -1,0 +1,272 @@
+"""`formation sweep` as a person types it."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from functools import partial
+
+import pytest
+
+from robot_formation import paths
+from robot_formation.cli.main import main
+from robot_formation.cli.sweep import default_folder, with_progress
+from robot_formation.experiment import sweep
+from robot_formation.experiment.sweep import Row, Task
+
+CHOICE = ("--tracks", "two", "--surfaces", "plane", "--predictors", "previous,formation", "--seeds", "1000:1003")
+SHORT = ("--set", "leader.timesteps=4")
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """The tasks that were carried out, in order; runs are made up and cost nothing."""
+    tasks = []
+
+    def run_task(task, settings):
+        tasks.append(task)
+        correction_m = 0.3 if task.predictor == "previous" else 0.1 + 0.001 * (task.seed % 10)
+        return Row(*task, "done", 15, correction_m, *[0.01] * 7)
+
+    monkeypatch.setattr(sweep, "run_task", run_task)
+    return tasks
+
+
+def call(capsys, *arguments):
+    code = main(["sweep", *map(str, arguments)])
+    return code, capsys.readouterr()
+
+
+def complaint(capsys, *arguments):
+    code, said = call(capsys, *arguments)
+    assert (code, said.out) == (2, "")
+    (line,) = said.err.strip().splitlines()
+    assert line.startswith("formation sweep: ")
+    return line
+
+
+# --- output -----------------------------------------------------------------------------------------------------------
+
+
+def test_json_is_all_of_standard_output_and_progress_goes_to_standard_error(capsys, tmp_path, made):
+    code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
+    assert code == 0
+    found = json.loads(said.out)
+    assert list(found) == ["runs", "summary"]
+    assert found["runs"] == str(tmp_path / "out" / "runs.csv")
+    assert [(entry["predictor"], entry["runs"]) for entry in found["summary"]] == [("previous", 3), ("formation", 3)]
+    assert found["summary"][1]["reduction"]["median"] == pytest.approx(1.0 - 0.101 / 0.3)
+    assert said.err.splitlines()[-1].startswith("6/6 runs, ")
+    assert said.err.rstrip().endswith("per minute, 0:00 left")
+    assert json.loads((tmp_path / "out" / "summary.json").read_text()) == {"summary": found["summary"]}
+
+
+def test_the_folder_holds_table_plan_and_both_summaries(capsys, tmp_path, made):
+    code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "a" / "b")
+    assert code == 0
+    assert sorted(p.name for p in (tmp_path / "a" / "b").iterdir()) == [
+        "runs.csv",
+        "summary.json",
+        "summary.md",
+        "sweep.json",
+    ]
+    printed = (tmp_path / "a" / "b" / "summary.md").read_text()
+    assert said.out.startswith(printed)
+    assert "| two | plane | formation | 3 | 0 |" in printed
+    assert len(made) == 6
+
+
+def test_without_out_a_new_folder_in_bags_is_made_each_time(capsys, tmp_path, made, monkeypatch):
+    monkeypatch.setattr(paths, "default_bags_dir", lambda: tmp_path / "bags")
+    monkeypatch.setattr("time.strftime", lambda form: "20260101-120000")
+    for _ in range(3):
+        assert call(capsys, *CHOICE, "--jobs", 1)[0] == 0
+    names = ["sweep_20260101-120000", "sweep_20260101-120000_2", "sweep_20260101-120000_3"]
+    assert sorted(path.name for path in (tmp_path / "bags").iterdir()) == names
+    assert default_folder().name == "sweep_20260101-120000_4"
+    assert len(made) == 18
+
+
+def test_a_finished_sweep_is_summarised_again_without_a_run(capsys, tmp_path, made):
+    arguments = (*CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
+    first = call(capsys, *arguments)[1].out
+    made.clear()
+    code, said = call(capsys, *arguments)
+    assert (code, said.out, said.err, made) == (0, first, "", [])
+
+
+def test_the_summary_is_of_what_was_asked_for_though_the_table_holds_more(capsys, tmp_path, made):
+    call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out")
+    fewer = [*CHOICE[:-1], "1001:1002"]
+    found = json.loads(call(capsys, *fewer, "--jobs", 1, "--out", tmp_path / "out", "--json")[1].out)
+    assert [entry["runs"] for entry in found["summary"]] == [1, 1]
+
+
+def test_a_real_sweep_from_the_command_to_the_numbers(capsys, tmp_path):
+    choice = (*CHOICE[:-1], "1000", *SHORT, "--jobs", 1, "--out", tmp_path / "out", "--json")
+    code, said = call(capsys, *choice)
+    assert code == 0
+    rows = list(sweep.read_rows(tmp_path / "out" / "runs.csv"))
+    assert [row.predictor for row in rows] == ["previous", "formation"]
+    for entry, row in zip(json.loads(said.out)["summary"], rows, strict=True):
+        assert entry["formation_error_rmse_m"]["median"] == row.formation_error_rmse_m
+
+
+# --- interruption -----------------------------------------------------------------------------------------------------
+
+
+def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(capsys, tmp_path, made, monkeypatch):
+    whole = sweep.carry_out
+
+    def interrupted(tasks, settings, jobs):
+        for number, row in enumerate(whole(tasks, settings, jobs)):
+            if number == 4:
+                raise KeyboardInterrupt
+            yield row
+
+    arguments = (*CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
+    monkeypatch.setattr(sweep, "carry_out", interrupted)
+    code, said = call(capsys, *arguments)
+    assert (code, said.out) == (130, "")
+    assert said.err.splitlines()[-1] == (
+        f"formation sweep: interrupted; the same command with --out {tmp_path / 'out'} goes on"
+    )
+    assert sum(1 for _ in sweep.read_rows(tmp_path / "out" / "runs.csv")) == 4
+    assert not (tmp_path / "out" / "summary.json").exists()
+
+    monkeypatch.setattr(sweep, "carry_out", whole)
+    made.clear()
+    code, said = call(capsys, *arguments)
+    assert code == 0
+    assert said.err.startswith(f"{tmp_path / 'out'}: 4 runs are there already, 2 are left\n")
+    assert made == [Task("two", "plane", "previous", 1002), Task("two", "plane", "formation", 1002)]
+    resumed = (tmp_path / "out" / "runs.csv").read_bytes()
+    call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "whole")
+    assert resumed == (tmp_path / "whole" / "runs.csv").read_bytes()
+
+
+def test_a_run_that_fails_ends_the_sweep_with_one_line_and_keeps_the_others(capsys, tmp_path, made, monkeypatch):
+    whole = sweep.run_task
+
+    def run_task(task, settings):
+        if len(made) == 3:
+            raise sweep.SweepError("track two, seed 1001: the run stands still")
+        return whole(task, settings)
+
+    monkeypatch.setattr(sweep, "run_task", run_task)
+    code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
+    assert (code, said.out) == (2, "")
+    assert said.err.splitlines()[-1] == "formation sweep: track two, seed 1001: the run stands still"
+    assert sum(1 for _ in sweep.read_rows(tmp_path / "out" / "runs.csv")) == 3
+
+
+def test_progress_passes_rows_on_and_tells_the_last_always(capsys):
+    assert list(with_progress(iter("abc"), 3)) == ["a", "b", "c"]
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("1/3 runs, ")
+    assert lines[-1].startswith("3/3 runs, ")
+
+
+# --- mistakes ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--tracks", "tow"], ["no track 'tow'", "'two'"]),
+        (["--predictors", "previous,formaton"], ["no predictor 'formaton'", "'formation'"]),
+        (["--surfaces", ","], ["no surface is given"]),
+        (["--predictors", "previous, previous"], ["given twice"]),
+        (["--seeds", "5:5"], ["--seeds 5:5 holds no seed"]),
+        (["--seeds", "few"], ["--seeds takes FIRST:END"]),
+        (["--jobs", "0"], ["--jobs is at least 1, not 0"]),
+        (["--set", "seed=1"], ["--set seed", "--seeds"]),
+        (["--set", "predictor.forgetting=7"], ["forgetting", "outside"]),
+    ],
+)
+def test_a_mistake_is_one_line_with_exit_code_2_and_makes_no_folder(capsys, tmp_path, made, options, words):
+    line = complaint(capsys, *CHOICE, "--out", tmp_path / "out", *options)
+    for word in words:
+        assert word in line
+    assert (made, list(tmp_path.iterdir())) == ([], [])
+
+
+def test_a_folder_of_something_else_or_other_settings_and_a_file_are_refused(capsys, tmp_path, made):
+    (tmp_path / "letter.txt").write_text("dear reader")
+    assert "is not empty and holds no sweep" in complaint(capsys, *CHOICE, "--out", tmp_path)
+    assert "letter.txt" in complaint(capsys, *CHOICE, "--out", tmp_path / "letter.txt")
+    call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out")
+    assert "other settings" in complaint(capsys, *CHOICE, *SHORT, "--out", tmp_path / "out")
+    assert (tmp_path / "letter.txt").read_text() == "dear reader"
+
+
+def test_an_unknown_option_is_a_usage_error(capsys):
+    with pytest.raises(SystemExit) as caught:
+        main(["sweep", "--jobs", "two"])
+    assert caught.value.code == 2
+    assert "--jobs" in capsys.readouterr().err
+
+
+def test_a_mistake_is_found_without_loading_dask_or_matplotlib():
+    program = (
+        "import sys; from robot_formation.cli.main import main; code = main(['sweep', '--tracks', 'tow']); "
+        "print(code, [m for m in ('dask', 'distributed', 'matplotlib') if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert result.stdout == "2 []\n"
+
+
+# --- Dask -------------------------------------------------------------------------------------------------------------
+
+
+def test_dask_that_is_not_installed_is_said_with_the_command_that_installs_it(capsys, tmp_path, made, monkeypatch):
+    monkeypatch.setitem(sys.modules, "dask.distributed", None)
+    line = complaint(capsys, *CHOICE, "--dask", "tcp://127.0.0.1:8786", "--out", tmp_path / "out")
+    assert line.endswith("--dask needs the package 'distributed'; pip install 'dask[distributed]'")
+
+
+def test_a_scheduler_that_does_not_answer_is_said(capsys, tmp_path, made, monkeypatch):
+    distributed = pytest.importorskip("dask.distributed")
+    patient = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout: patient(address, timeout="0.3s"))
+    line = complaint(capsys, *CHOICE, "--dask", "tcp://127.0.0.1:1", "--out", tmp_path / "out")
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1: " in line
+    line = complaint(capsys, *CHOICE, "--dask", "nonsense://", "--out", tmp_path / "out")
+    assert "no Dask scheduler answers at nonsense://: " in line
+
+
+def test_a_failure_to_connect_without_words_is_said_too(capsys, tmp_path, made, monkeypatch):
+    distributed = pytest.importorskip("dask.distributed")
+
+    def fail(address, timeout):
+        raise TimeoutError
+
+    monkeypatch.setattr(distributed, "Client", fail)
+    line = complaint(capsys, *CHOICE, "--dask", "tcp://10.0.0.1:8786", "--out", tmp_path / "out")
+    assert line.endswith("no Dask scheduler answers at tcp://10.0.0.1:8786: TimeoutError")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    distributed = pytest.importorskip("dask.distributed")
+    options = {"processes": False, "n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as found:
+        yield found.scheduler_address
+
+
+def test_a_dask_cluster_yields_the_same_table_as_this_machine(cluster):
+    tasks = [Task("two", "plane", "formation", seed) for seed in (1000, 1001)]
+    settings = ("leader.timesteps=4",)
+    there = {row.task: repr(row) for row in sweep.carry_out_by_dask(tasks, settings, cluster)}
+    here = {row.task: repr(row) for row in sweep.carry_out(tasks, settings, 1)}
+    assert there == here
+
+
+def test_a_run_that_fails_on_a_dask_cluster_is_named(cluster, monkeypatch):
+    task = Task("two", "plane", "previous", 1000)
+    stuck = ("leader.timesteps=4", "world.lockstep=[leader,follower_1]")
+    with pytest.raises(sweep.SweepError, match=r"seed 1000: .*everybody waits"):
+        list(sweep.carry_out_by_dask([task], stuck, cluster))
+    monkeypatch.setattr(sweep, "run_task", partial(replace, 5))  # nothing that a worker could do
+    with pytest.raises(sweep.SweepError, match=r"a Dask worker can't do the runs: TypeError: .*goes on"):
+        list(sweep.carry_out_by_dask([task], (), cluster))

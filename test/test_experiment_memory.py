@@ -1,0 +1,63 @@
+"""A run in memory is analysed as the bag of the same run is."""
+
+import pytest
+
+from robot_formation.analysis.from_bag import load_run, run_topics
+from robot_formation.analysis.quantities import analyse
+from robot_formation.experiment.in_process import InProcessRun, run_in_process
+from robot_formation.experiment.memory import run_in_memory
+from robot_formation.experiment.run_result import RunError
+from robot_formation.experiment.scenario import load_track, override
+
+BASE = ["world.camera.mode=on_demand", "leader.timesteps=5", "predictor.name=formation"]
+CASES = {
+    "one follower": ["seed=1000"],
+    "two followers under the overhead camera": ["seed=3", "followers=2", "leader.timesteps=4"],
+    "lost": ["world.camera.pan_deg=-90"],
+}
+
+
+@pytest.mark.parametrize("settings", CASES.values(), ids=CASES)
+def test_the_analysis_is_that_of_the_bag_of_the_same_run(tmp_path, settings):
+    scenario = override(load_track("one"), [*BASE, *settings])
+    details = {"scenario": scenario.setup.name, "timesteps": str(scenario.parameters("leader")["timesteps"])}
+    result = run_in_process(scenario, tmp_path / "bag", details)
+    recorded = load_run(tmp_path / "bag")
+    record = run_in_memory(scenario)
+    assert record.details == {**details, "outcome": "lost" if result.exit_code else "done"}
+    assert record.leader_moved == recorded.leader_moved
+    assert record.simulated_s == recorded.simulated_s
+    assert repr(analyse(record).to_json()) == repr(analyse(recorded).to_json())
+
+
+def test_a_short_run_is_done_and_a_lost_one_lost():
+    done = analyse(run_in_memory(override(load_track("two"), ["leader.timesteps=1", "world.camera.mode=on_demand"])))
+    assert (done.outcome, done.scenario) == ("done", "track_two")
+    lost = analyse(run_in_memory(override(load_track("two"), [*BASE, "world.camera.pan_deg=-90"])))
+    assert (lost.outcome, lost.followers[0].lost) == ("lost", True)
+
+
+def test_the_run_may_be_of_another_make_and_only_topics_of_the_analysis_are_kept():
+    seen, made = set(), []
+
+    class Run(InProcessRun):
+        def _send(self, namespace, topic, message):
+            seen.add(topic.name)
+            super()._send(namespace, topic, message)
+
+    def make_run(scenario, listen):
+        made.append(Run(scenario, listen=listen))
+        return made[0]
+
+    scenario = override(load_track("two"), ["leader.timesteps=1", "world.camera.mode=on_demand"])
+    record = run_in_memory(scenario, make_run)
+    assert len(made) == 1
+    assert "blocks" in seen
+    assert not any(topic.endswith("blocks") for topic in run_topics(scenario.robots))
+    assert len(record.followers[0].displacements) == 1
+
+
+def test_a_run_that_stands_still_is_an_error():
+    stuck = override(load_track("two"), [*BASE, "world.lockstep=[leader,follower_1]"])
+    with pytest.raises(RunError, match="everybody waits"):
+        run_in_memory(stuck)
