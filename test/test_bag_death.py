@@ -39,8 +39,9 @@ def end_chunk():
 
 try:
     for number in range(10**9):
+        queue.check()
         while queue.waiting_bytes > 10000:
-            pass
+            queue.check()
         queue.put("/tick", "std_msgs/msg/UInt32", bytes([0, 1, 0, 0]) + number.to_bytes(4, "little"), number)
         if number % 100 == 0:
             queue.call(end_chunk)

@@ -60,12 +60,15 @@ def test_a_message_larger_than_the_queue_goes_in_alone(recorder):
     assert len(words_in(recorder.close())) == 1
 
 
-def test_an_error_on_the_disk_reaches_whoever_puts(recorder):
+def test_after_an_error_on_the_disk_nothing_is_taken_and_whoever_asks_is_told(recorder):
     queue = RecordingQueue(recorder)
     queue.put("/unknown", STRING, cdr("x"))
     queue.stop()
+    assert not queue.put("/words", STRING, cdr("x"))
+    queue.call(lambda: pytest.fail("called"))
+    assert not queue.dropped
     with pytest.raises(BagError, match="'/unknown' is unknown"):
-        queue.put("/words", STRING, cdr("x"))
+        queue.check()
     with pytest.raises(BagError, match="'/unknown' is unknown"):
         queue.finish()
     recorder.close()

@@ -221,7 +221,8 @@ def test_a_recorder_whose_disk_is_full_ends_with_a_clear_error(lab, tmp_path):
     publisher = lab.node.create_publisher(UInt32, "/tick", RELIABLE)
     lab.until(publisher.get_subscription_count)
     flood(lab, publisher, lambda: recorder.poll() is not None)
-    error = lab.result(recorder, code=2).strip().splitlines()[-1]
+    begin, error = lab.result(recorder, code=2).strip().splitlines()
+    assert begin == "recording /tick (std_msgs/msg/UInt32)"
     assert error.startswith("formation record: ")
     assert "File too large" in error
     assert f"formation recover {tmp_path / 'bag.partial'}" in error

@@ -17,7 +17,8 @@ QUEUE_BYTES = 1 << 26
 class RecordingQueue:
     """Hands messages to a recorder on a thread of its own.
 
-    One thread puts and may never wait for the disk. All methods are for that thread.
+    One thread puts and may never wait for the disk. All methods are for that thread. Once a message could not be
+    written, nothing more is taken, and `check` and `finish` say why; putting raises nothing, since callbacks do it.
 
     Args:
         recorder: where the messages go; it belongs to the queue until `finish`.
@@ -43,12 +44,9 @@ class RecordingQueue:
         return self._put_bytes - self._done_bytes
 
     def put(self, topic: str, type_name: str, cdr: bytes, received_ns: int | None = None) -> bool:
-        """Record a message soon; arguments as for `Recorder.record`. Returns whether there was room for it.
-
-        Raises:
-            BagError: an earlier message could not be written.
-        """
-        self.check()
+        """Record a message soon; arguments as for `Recorder.record`. Returns whether there was room for it."""
+        if self._error is not None:
+            return False
         size = len(cdr)
         waiting = self.waiting_bytes + size
         # A message larger than the queue goes in when nothing else waits, else it never could.
@@ -61,13 +59,9 @@ class RecordingQueue:
         return True
 
     def call(self, action: Callable[[], object]) -> None:
-        """Do something with the recorder after everything that was put before.
-
-        Raises:
-            BagError: an earlier message could not be written.
-        """
-        self.check()
-        self._tasks.put(action)
+        """Do something with the recorder after everything that was put before."""
+        if self._error is None:
+            self._tasks.put(action)
 
     def check(self) -> None:
         """Raise what went wrong on the disk, if anything.

@@ -97,7 +97,11 @@ class BagWriter:
         self._failure: BagError | None = None
         with self._system_errors():
             self.partial_path.mkdir(parents=True)
-            self._file = self._next_file()
+            try:
+                self._file = self._next_file()
+            except OSError:
+                shutil.rmtree(self.partial_path, ignore_errors=True)  # nothing in it yet
+                raise
 
     @property
     def file_name(self) -> str:
