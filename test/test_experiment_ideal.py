@@ -150,26 +150,51 @@ def test_only_prediction_moves_from_timestep_4_on_are_replaced(closed):
 
 
 @pytest.mark.parametrize("surface", ["plane", "bowl"])
-def test_a_move_ends_where_the_face_would_show_no_offset(surface):
+def test_a_move_ends_where_the_camera_would_show_no_offset(surface):
     story = Story("seed=1000", close=False, surface=surface)
     assert story.code == 0
     world = from_mapping(WorldNodeParameters, story.scenario.parameters("world"), where="world")
-    face = TargetFace(Camera(world.make_surface(), world), world)
-    poses, predicting, checked = {}, False, 0
+    ground = world.make_surface()
+    face = TargetFace(Camera(ground, world), world)
+    poses, predicting, errors, checked = {}, False, [], 0
     for topic, message in story.messages:
         if topic.startswith("/ground_truth/") and topic.endswith("odom"):
             p, q = message.pose.pose.position, message.pose.pose.orientation
             poses[topic.split("/")[2]] = Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
         elif topic == "/follower_1/alignment":
             predicting = message.data == "predict"
+        elif topic == "/follower_1/residual":
+            seen = conversions.read_displacement(message)
+            true = face.offset(poses["follower_1"], poses["leader"], ALIGNMENT)
+            errors.append((seen.x_m - true[0], seen.y_m - true[1]))
         elif topic == "/follower_1/move" and predicting:
             motion = conversions.read_move(message)
             start = poses["follower_1"]
-            there = Pose(start.place((motion.x_m, motion.y_m, 0.0)), start.orientation)
+            x_m, y_m, _ = start.place((motion.x_m, motion.y_m, 0.0))
+            offset = face.offset(pose_on_surface(ground, x_m, y_m, start.yaw_rad), poses["leader"], ALIGNMENT)
             assert motion.yaw_rad == 0.0
-            assert face.offset(there, poses["leader"], ALIGNMENT) == pytest.approx((0.0, 0.0), abs=1e-5)
+            assert np.add(offset, np.mean(errors, axis=0)) == pytest.approx((0.0, 0.0), abs=1e-5)
             checked += 1
     assert checked == TIMESTEPS - 3
+
+
+def test_the_predictor_is_told_of_the_move_that_was_commanded(closed):
+    last, misses = {}, []
+    for topic, message in closed.messages:
+        name = topic.removeprefix("/follower_1/")
+        if name == "alignment":
+            last["state"] = message.data
+        elif name in ("move", "moved") and last["state"] in ("collect", "predict"):
+            last[name] = conversions.read_move(message) if name == "move" else conversions.read_displacement(message)
+        elif name in ("commanded", "displacement"):
+            last[name] = conversions.read_displacement(message)
+            if name == "displacement":
+                missed = (last["moved"].u_m - last["move"].u_m, last["moved"].v_m - last["move"].v_m)
+                total, told = last["displacement"], last["commanded"]
+                misses.append(missed)
+                assert (total.u_m - told.u_m, total.v_m - told.v_m) == pytest.approx(missed, abs=1e-12)
+    assert len(misses) == TIMESTEPS
+    assert np.abs(misses).max() > 1e-3
 
 
 def test_the_actuation_bias_is_taken_off_the_closed_floors_moves(monkeypatch):

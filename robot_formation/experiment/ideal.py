@@ -1,12 +1,13 @@
 """The noise floor of a run: the same controller, but its prediction moves are the ideal ones, by ground truth.
 
-What is left for the camera to correct then comes from the robot's own scatter and the camera's noise; no predictor can
-do better on average. `ideal` commands the ideal move itself, `ideal+close` takes off the actuation bias as the
-project's predictor has learned it in the same run.
+What is left for the camera to correct then comes from the robot's own scatter and the camera's noise. `ideal` commands
+the ideal move itself, `ideal+close` takes off the actuation bias as the project's predictor has learned it in the same
+run. The camera's systematic error is part of what ideal means, since the fine-tuner corrects until the camera is content.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -23,7 +24,7 @@ from robot_formation.experiment.scenario import Scenario
 from robot_formation.parameters import from_mapping
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import Pose
+from robot_formation.world.pose import Pose, pose_on_surface
 
 IDEAL = ("ideal", "ideal+close")
 _ITERATIONS = 8
@@ -35,9 +36,12 @@ class IdealRun(InProcessRun):
     def __init__(self, scenario: Scenario, listen: Callable[[str, Any], None], *, close: bool) -> None:
         self._poses: dict[str, Pose] = {}
         self._predicting: set[str] = set()
+        self._changes: dict[str, Motion] = {}  # what was commanded in this timestep less what was predicted
+        self._camera_errors: dict[str, list[tuple[float, float]]] = defaultdict(list)
         self._odometry = {absolute("", names.ground_truth_odom(robot).name): robot for robot in scenario.robots}
         world = from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world")
-        self._face = TargetFace(Camera(world.make_surface(), world), world)
+        self._surface = world.make_surface()
+        self._face = TargetFace(Camera(self._surface, world), world)
         self._alignment = from_mapping(
             FineTunerNodeParameters, scenario.parameters("fine_tuner"), where="fine_tuner"
         ).alignment
@@ -54,19 +58,32 @@ class IdealRun(InProcessRun):
             self._predicting.add(namespace)
         elif topic == names.MOVE and namespace in self._predicting:
             self._predicting.discard(namespace)
-            motion = self._ideal(namespace)
+            predicted, motion = conversions.read_move(message), self._ideal(namespace)
+            self._changes[namespace] = Motion(motion.x_m - predicted.x_m, motion.y_m - predicted.y_m)
             message = conversions.move(motion, message.header.frame_id, conversions.stamp_of(message))
+        elif topic == names.COMMANDED and namespace in self._changes:
+            message = _changed(message, self._changes.pop(namespace))
+        elif topic == names.RESIDUAL and conversions.has_estimate(message):
+            self._learn(namespace, conversions.read_displacement(message))
         super()._send(namespace, topic, message)
+
+    def _learn(self, namespace: str, residual: Motion) -> None:
+        """Compare the camera's residual with the truth: the difference is mostly the same in each timestep."""
+        robot = namespace.removeprefix("/")
+        dx_m, dy_m = self._face.offset(self._poses[robot], self._poses[names.beacon_neighbour(robot)], self._alignment)
+        self._camera_errors[namespace].append((residual.x_m - dx_m, residual.y_m - dy_m))
 
     def _ideal(self, namespace: str) -> Motion:
         """Find the move after which the camera would see no offset, by fixed-point iteration on its own estimate."""
         robot = namespace.removeprefix("/")
         start, neighbour = self._poses[robot], self._poses[names.beacon_neighbour(robot)]
+        error_x_m, error_y_m = np.mean(self._camera_errors[namespace] or [(0.0, 0.0)], axis=0).tolist()
         x_m = y_m = 0.0
         for _ in range(_ITERATIONS):
-            there = Pose(start.place((x_m, y_m, 0.0)), start.orientation)
+            along, across, _ = start.place((x_m, y_m, 0.0))
+            there = pose_on_surface(self._surface, along, across, start.yaw_rad)
             dx_m, dy_m = self._face.offset(there, neighbour, self._alignment)
-            x_m, y_m = x_m + dx_m, y_m + dy_m
+            x_m, y_m = x_m + dx_m + error_x_m, y_m + dy_m + error_y_m
         predictor = self._predictors.get(namespace)
         bias_u, bias_v = predictor.actuation_bias() if predictor is not None else (0.0, 0.0)
         return Motion(x_m - bias_v, y_m + bias_u)
@@ -92,6 +109,16 @@ class TargetFace:
             (column - self._centre_px) / alignment.slope_px_per_m,
             alignment.side_px_m / side - alignment.distance_m,
         )
+
+
+def _changed(commanded: Any, change: Motion) -> Any:
+    """Tell the predictor of the move that was commanded in place of its own: it learns the robot's bias from it."""
+    if not conversions.has_estimate(commanded):
+        return commanded
+    motion = conversions.read_displacement(commanded)
+    changed = Motion(motion.x_m + change.x_m, motion.y_m + change.y_m)
+    stamp_ns = conversions.stamp_of(commanded)
+    return conversions.displacement(changed, commanded.header.frame_id, stamp_ns, (0.0,) * 4)
 
 
 def _pose(message: Any) -> Pose:
