@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from robot_formation.bag.reader import read_bag
@@ -15,7 +16,7 @@ from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.experiment.recording import Recording
 from robot_formation.experiment.replay import replay_detector, replay_predictor
 from robot_formation.experiment.replay_fine_tuner import replay_fine_tuner
-from robot_formation.names import IMAGE_TYPE
+from robot_formation.names import IMAGE_TYPE, PREDICTION
 
 ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "bags" / "samples"
@@ -66,6 +67,9 @@ def test_todays_predictor_and_fine_tuner_answer_a_sample_as_it_was_answered(name
         recording = Recording(bag)
         (predictions,) = replay_predictor(recording, {})
         (decisions,) = replay_fine_tuner(recording, {})
+        covariances = [message.pose.covariance for message in recording.messages("follower_1", PREDICTION)]
+    today = [message.pose.covariance for message in predictions.sent]
+    np.testing.assert_allclose(today, covariances, rtol=0.0, atol=SCRIPT.TOLERANCE, err_msg=MAKE_ANEW)
     changed = [row.timestep for row in predictions.rows if not same(row.recorded, row.today)]
     for row in decisions.rows:
         pairs = zip(row.recorded.moves, row.today.moves, strict=False)

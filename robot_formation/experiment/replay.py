@@ -32,11 +32,19 @@ class PredictionRow:
 
 @dataclass(frozen=True)
 class PredictionReplay:
-    """A follower's predictions, recorded and today's. `identical`: every message has the same values."""
+    """A follower's predictions, recorded and today's.
+
+    Attributes:
+        robot: the follower.
+        rows: its timesteps.
+        identical: every message has the same values, covariances too.
+        sent: the messages that today's predictor sent.
+    """
 
     robot: str
     rows: tuple[PredictionRow, ...]
     identical: bool
+    sent: tuple[Any, ...]
 
     @property
     def changed(self) -> int:
@@ -92,7 +100,7 @@ def _replay_predictor(recording: Recording, robot: str, parameters: Any) -> Pred
         residual = residuals[number] if number < len(residuals) else None
         ideal = _ideal(displacement, residual)
         rows.append(PredictionRow(number + 1, _estimate(before.get(stamp_ns)), _estimate(after.get(stamp_ns)), ideal))
-    return PredictionReplay(robot, tuple(rows), equal(recorded, today))
+    return PredictionReplay(robot, tuple(rows), equal(recorded, today), tuple(today))
 
 
 def _by_stamp(messages: list[Any]) -> dict[int, Any]:
