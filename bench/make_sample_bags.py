@@ -65,20 +65,15 @@ SAMPLES = {
 
 
 def make(sample: Sample, folder: Path) -> Path:
-    """Run the scenario and put its bag in the place of the old one.
+    """Run the scenario; return its bag in the folder.
 
     Raises:
-        FormationError: if the run doesn't come to its end; the old bag stays.
+        FormationError: if the run doesn't come to its end.
     """
-    with tempfile.TemporaryDirectory(prefix=".new_", dir=folder) as new:
-        result = Launcher(sample.scenario(), Path(new) / sample.name, images=sample.images).run()
-        if result.exit_code or result.bag is None:
-            raise FormationError(f"{sample.name}: the run ended with exit code {result.exit_code}: {result.reason}")
-        target = folder / sample.name
-        if target.exists():
-            shutil.rmtree(target)
-        result.bag.rename(target)
-    return target
+    result = Launcher(sample.scenario(), folder / sample.name, images=sample.images).run()
+    if result.exit_code or result.bag is None:
+        raise FormationError(f"{sample.name}: the run ended with exit code {result.exit_code}: {result.reason}")
+    return result.bag
 
 
 def changes(sample: Sample, folder: Path) -> list[str]:
@@ -116,14 +111,20 @@ def differences(one: Any, other: Any, where: str = "") -> Iterator[str]:
 
 
 def remake(names: list[str], folder: Path) -> int:
-    """Make the bags; tell each one's size; return the exit code."""
+    """Make the bags and put them in the place of the old ones, which stay if any run fails; return the exit code."""
     folder.mkdir(parents=True, exist_ok=True)
     total = 0
-    for name in names:
-        bag = make(SAMPLES[name], folder)
-        size = sum(file.stat().st_size for file in bag.iterdir())
-        total += size
-        print(f"{bag}: {size / 1e6:.2f} MB", flush=True)
+    with tempfile.TemporaryDirectory(prefix=".new_", dir=folder) as new:
+        # Bags name the commit, and would say that it has been changed once an old one is replaced.
+        bags = [make(SAMPLES[name], Path(new)) for name in names]
+        for bag in bags:
+            target = folder / bag.name
+            if target.exists():
+                shutil.rmtree(target)
+            bag.rename(target)
+            size = sum(file.stat().st_size for file in target.iterdir())
+            total += size
+            print(f"{target}: {size / 1e6:.2f} MB", flush=True)
     print(f"together {total / 1e6:.2f} MB")
     return 0
 
