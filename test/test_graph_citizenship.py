@@ -80,8 +80,8 @@ class Site(Lab):
             _, errors = process.communicate(timeout=30)
             ended[node] = process.returncode
             assert "Traceback" not in errors, f"{node}: {errors}"
-        wanted = set(NAMESPACES.items())
-        self.until(lambda: not wanted & set(self.node.get_node_names_and_namespaces()))
+        self.rejoin()
+        self.clients.clear()
         return ended
 
     def endpoint(self, find, topic, node):
