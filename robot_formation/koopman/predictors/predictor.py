@@ -103,6 +103,7 @@ class Predictor:
         self._uu = parameters.sigma_u_m**2 * self._weight
         self._uv = 0.0
         self._vv = parameters.sigma_v_m**2 * self._weight
+        self._largest_u_m, self._largest_v_m = 10.0 * parameters.max_u_m, 10.0 * parameters.max_v_m
         self._expected: Vector | None = None
         self.observations = 0
 
@@ -119,10 +120,13 @@ class Predictor:
         Raises:
             PredictionError: if a component is not finite or longer than ten times the bound.
         """
-        x = self._checked("displacement", displacement)
-        r = None if residual is None else self._checked("residual", residual)
-        c = None if commanded is None else self._checked("commanded displacement", commanded)
-        u, v = x.tolist()
+        x, u, v = self._checked("displacement", displacement)
+        r = c = None
+        residual_u = residual_v = 0.0
+        if residual is not None:
+            r, residual_u, residual_v = self._checked("residual", residual)
+        if commanded is not None:
+            c, _, _ = self._checked("commanded displacement", commanded)
         if abs(u) < _FINEST_M:
             x[0] = u = 0.0
         if abs(v) < _FINEST_M:
@@ -134,11 +138,8 @@ class Predictor:
             self._model.observe(x)
             mean = self._model.forecast()
         if self._expected is not None:
-            if r is not None:
-                residual_u, residual_v = r.tolist()
-                u, v = u + residual_u, v + residual_v
             expected_u, expected_v = self._expected.tolist()
-            error_u, error_v = u - expected_u, v - expected_v
+            error_u, error_v = u + residual_u - expected_u, v + residual_v - expected_v
             keep = self.parameters.sigma_discount
             self._uu = keep * self._uu + error_u * error_u
             self._uv = keep * self._uv + error_u * error_v
@@ -200,14 +201,15 @@ class Predictor:
         """Show K, condition number and innovation where the model has them."""
         return self._model.insight() if self._closing is None else self._closing.insight()
 
-    def _checked(self, what: str, value: Vector) -> Vector:
+    def _checked(self, what: str, value: Vector) -> tuple[Vector, float, float]:
+        """Return a copy of a vector (2,), and its components; refuse what no robot can do."""
         x = np.array(value, dtype=float)
         u, v = x.tolist()
+        if abs(u) <= self._largest_u_m and abs(v) <= self._largest_v_m:  # never of NaN
+            return x, u, v
         if not (math.isfinite(u) and math.isfinite(v)):
             raise PredictionError(f"refused the {what} (u {u}, v {v}): not finite")
-        if abs(u) > 10.0 * self.parameters.max_u_m or abs(v) > 10.0 * self.parameters.max_v_m:
-            raise PredictionError(f"refused the {what} (u {u}, v {v}) m: no robot goes so far in a timestep")
-        return x
+        raise PredictionError(f"refused the {what} (u {u}, v {v}) m: no robot goes so far in a timestep")
 
     def _bounded(self, mean: Vector) -> Vector:
         u, v = mean.tolist()
