@@ -5,7 +5,17 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "robot_formation"
-NODES = ("world", "drive", "leader", "block_detector", "predictor", "fine_tuner", "overhead_tracker", "recorder")
+NODES = (
+    "world",
+    "drive",
+    "leader",
+    "block_detector",
+    "predictor",
+    "fine_tuner",
+    "overhead_tracker",
+    "recorder",
+    "player",
+)
 
 
 def shared(folder: str) -> list[tuple[str, list[str]]]:

@@ -1,6 +1,7 @@
 """Rewrites the parameter tables of the node pages from the dataclasses that declare the parameters.
 
-The table of a page stands between the comments <!-- parameters --> and <!-- /parameters -->.
+The table of a page, and below it what can be set while the node runs, stand between the comments <!-- parameters -->
+and <!-- /parameters -->.
 
 Run: python docs/make_parameter_tables.py [--check]
 """
@@ -10,14 +11,16 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment.scenario import node_defaults
-from robot_formation.nodes.parameters import HostParameters
-from robot_formation.nodes.recorder import RecorderParameters
+from robot_formation.nodes.parameters import AT_START, HostParameters, reasons
+from robot_formation.nodes.playing import PlayerNode, PlayerParameters
+from robot_formation.nodes.recording import RecorderNode, RecorderParameters
 from robot_formation.parameters import Spec, specs
 
 PAGES = Path(__file__).parent / "nodes"
@@ -38,7 +41,31 @@ _TYPES: dict[Any, str] = {
 def parameter_classes() -> dict[str, type]:
     """List the parameter class of every page, by the page's name."""
     classes = {name: kind.parameter_class() for name, kind in KINDS.items()}
-    return {**classes, "recorder": RecorderParameters, COMMON: HostParameters}
+    return {**classes, "recorder": RecorderParameters, "player": PlayerParameters, COMMON: HostParameters}
+
+
+def fixed_parameters(name: str) -> Mapping[str, str]:
+    """List why parameters of a page can't be set while the node runs, by shell pattern."""
+    if name in KINDS:
+        fixed: Mapping[str, str] = KINDS[name].component_class().fixed
+        return fixed
+    return {"recorder": RecorderNode.fixed, "player": PlayerNode.fixed, COMMON: {"*": AT_START}}[name]
+
+
+def changes(name: str, parameters: type) -> str:
+    """Say which parameters can be set while the node runs."""
+    known = list(specs(parameters))
+    fixed = reasons(known, fixed_parameters(name))
+    free = [f"`{parameter}`" for parameter in known if parameter not in fixed]
+    why = "; ".join(dict.fromkeys(fixed.values()))
+    if not fixed:
+        return "All can be set while the node runs (`ros2 param set`)."
+    if not free:
+        return f"None can be set while the node runs; the reason that is given: {why}."
+    if len(free) < len(fixed):
+        return f"While the node runs, {' and '.join(free)} can be set. The reason that is given for the others: {why}."
+    named = " and ".join(f"`{parameter}`" for parameter in fixed)
+    return f"All but {named} can be set while the node runs (`ros2 param set`); the reason that is given: {why}."
 
 
 def table(name: str, parameters: type) -> str:
@@ -57,7 +84,9 @@ def updated(name: str, parameters: type) -> tuple[str, str]:
     text = path.read_text(encoding="utf-8")
     if len(_TABLE.findall(text)) != 1:
         raise FormationError(f"{path} needs <!-- parameters --> and <!-- /parameters --> once, each on its own line")
-    return text, _TABLE.sub(lambda match: f"{match[1]}{table(name, parameters)}\n{match[2]}", text)
+    return text, _TABLE.sub(
+        lambda match: f"{match[1]}{table(name, parameters)}\n\n{changes(name, parameters)}\n{match[2]}", text
+    )
 
 
 def _row(spec: Spec, configured: dict[str, Any]) -> str:

@@ -12,6 +12,7 @@ from launch_ros.actions import Node
 from launch import LaunchContext, LaunchDescription
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.launching.processes import processes
+from robot_formation.paths import config_dir
 
 ARGUMENTS = {
     "track": ("two", "preset track: see 'formation list tracks'"),
@@ -24,6 +25,7 @@ ARGUMENTS = {
     "set": ("", "further settings, separated by spaces, like 'predictor.forgetting=0.95 followers=2'"),
     "bag": ("", "folder of the bag, which must not exist; empty: nothing is recorded"),
     "images": ("false", "record pictures too"),
+    "rviz": ("false", "show the run in RViz, where rviz2 is installed; closing it doesn't end the run"),
     "discovery_range": ("LOCALHOST", "who may find the nodes: LOCALHOST, SUBNET, OFF or SYSTEM_DEFAULT"),
 }
 
@@ -45,7 +47,7 @@ def nodes(context: LaunchContext) -> list[Node]:
     scenario = scenarios.override(scenario, [*named, *value["set"].split()])
     scenario.check()
     bag = Path(value["bag"]).absolute() if value["bag"] else None
-    return [
+    started = [
         Node(
             package="robot_formation",
             executable=process.executable,
@@ -54,8 +56,24 @@ def nodes(context: LaunchContext) -> list[Node]:
             output="screen",
             on_exit=Shutdown(reason=f"{process.name} has ended"),
         )
-        for process in processes(scenario, bag, images=value["images"].lower() == "true")
+        for process in processes(scenario, bag, images=is_true(value["images"]))
     ]
+    return [*started, rviz()] if is_true(value["rviz"]) else started
+
+
+def is_true(text: str) -> bool:
+    """Read a switch as other launch files do."""
+    return text.lower() in ("true", "1")
+
+
+def rviz() -> Node:
+    """Make the viewer, with the displays of a formation."""
+    return Node(
+        package="rviz2",
+        executable="rviz2",
+        arguments=["-d", str(config_dir() / "formation.rviz")],
+        parameters=[{"use_sim_time": True}],
+    )
 
 
 def generate_launch_description() -> LaunchDescription:

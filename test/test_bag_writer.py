@@ -311,6 +311,16 @@ def test_a_full_disk_is_told_in_one_line(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with BagWriter(tmp_path / "run") as writer:
-        monkeypatch.setattr(writer._mcap, "flush", full)
+        monkeypatch.setattr(writer._file, "end_chunk", full)
         with pytest.raises(BagError, match="No space left on device; free space"):
             writer.end_chunk()
+
+
+def test_a_disk_that_is_full_at_the_beginning_is_left_as_it_was(tmp_path, monkeypatch):
+    def full(*arguments, **options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("robot_formation.bag.writer.McapFile", full)
+    with pytest.raises(BagError, match=r"No space left on device; free space or choose another path$"):
+        BagWriter(tmp_path / "run")
+    assert list(tmp_path.iterdir()) == []

@@ -245,7 +245,7 @@ def changed_parameters(wire, signatures, **values):
 
 
 def test_changed_parameters_count_from_the_next_picture_on_and_blocks_keep_their_index(wire, signatures):
-    assert wire.component.settable
+    assert wire.component.fixed == {}
     wire.give(IMAGE, image(SQUARE, 1))
     (before,) = blocks_in(wire.give(IMAGE, image(SQUARE, 2)))
     changed_parameters(wire, signatures, min_block_area=100)

@@ -6,8 +6,10 @@ import pytest
 from component_helpers import wired
 
 from robot_formation import conversions
-from robot_formation.control.drive import JOINTS
+from robot_formation.control.calibration import CalibrationError
+from robot_formation.control.drive import JOINTS, DriveParameters
 from robot_formation.control.motion import Motion
+from robot_formation.parameters import ParameterError
 
 R, E = 0.03, 0.019  # radii of drive and encoder wheels
 
@@ -97,3 +99,25 @@ def test_the_stop_service_brakes_and_says_whether_there_was_anything_to_stop(wir
     assert stop() == (True, "stopped on request")
     assert conversions.read_joint_command(wire.sent[-1][1]).angles_rad == (0.0,) * 4
     assert [topic for topic, _ in wire.give("joint_states", states())] == ["odom", "moved"]
+
+
+def test_parameters_are_taken_between_moves_and_odometry_and_joints_go_on(wire):
+    set_parameters = wire.component.set_parameters
+    wire.give("move", move(Motion(0.05)))
+    with pytest.raises(ParameterError, match="after 'moved'"):
+        set_parameters(DriveParameters(wheel_speed_rad_s=2.0))
+    wire.give("joint_states", states((0, 0, 0, 0, 0.05 / E, 0), stamp_ns=1))
+    set_parameters(DriveParameters(wheel_speed_rad_s=2.0, max_v_m=0.06))
+    ((_, command),) = wire.give("move", move(Motion(0.05)))
+    assert conversions.read_joint_command(command).limits_rad_s == (2.0,) * 4
+    sent = dict(wire.give("joint_states", states((0, 0, 0, 0, 0.1 / E, 0), stamp_ns=2)))
+    assert sent["moved"].pose.pose.position.x == pytest.approx(0.05)
+    assert sent["odom"].pose.pose.position.x == pytest.approx(0.1)
+    wire.give("move", move(Motion(0.07)))
+    assert "beyond the calibrated range of 0.06" in wire.warnings[-1]
+
+
+def test_a_calibration_file_that_cannot_be_used_changes_nothing(wire):
+    with pytest.raises(CalibrationError, match="missing"):
+        wire.component.set_parameters(DriveParameters(calibration_file="missing.yaml"))
+    assert wire.component.details()["calibration"] == "by parameters"

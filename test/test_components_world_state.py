@@ -173,8 +173,6 @@ def test_a_reset_takes_seed_surface_and_starts_that_were_set_before():
 @pytest.mark.parametrize(
     ("values", "says"),
     [
-        ({"robots": ["leader", "follower_2"]}, "'robots' decides on topics"),
-        ({"overhead": {"enabled": True}}, "'overhead.enabled' decides on topics"),
         ({"surface": "bowel"}, "did you mean 'bowl'"),
         ({"start_x_m": [0.5, 3.0]}, "beyond the plate"),
     ],

@@ -12,13 +12,12 @@ from robot_formation.cli.main import VERBS
 from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import load_track
-from robot_formation.nodes.recorder import RecorderParameters
 from robot_formation.parameters import from_mapping, specs
 
 ROOT = Path(__file__).parent.parent
 NODE_PAGES = ROOT / "docs" / "nodes"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md", *(ROOT / "docs").rglob("*.md")]
-NODES = [*KINDS, "recorder"]
+NODES = [*KINDS, "recorder", "player"]
 QOS = {
     "event": names.EVENT,
     "history": names.HISTORY,
@@ -92,6 +91,41 @@ def test_a_nodes_page_names_its_services_and_diagnostics(kind):
         assert f"`{name}`" in page
 
 
+@pytest.mark.parametrize(
+    ("node", "modules"), [("recorder", ("recording", "recorder_health")), ("player", ("playing",))]
+)
+def test_the_pages_of_recorder_and_player_name_what_these_make_beside_a_bags_topics(node, modules):
+    code = "".join((ROOT / "robot_formation" / "nodes" / f"{module}.py").read_text() for module in modules)
+    page = (NODE_PAGES / f"{node}.md").read_text()
+    for kind, name in re.findall(r'create_service\((\w+), "([^"]+)"', code):
+        assert f"| `{name}` | std_srvs/srv/{kind} |" in page
+    own = [getattr(names, name) for name in re.findall(r"= names\.([A-Z]\w+)$", code, re.MULTILINE)]
+    assert len(own) == code.count("create_publisher(")
+    for topic in own:
+        assert f"`{topic.name}` ({topic.type}, {qos_name(topic.qos)})" in page
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_node_pages_have_one_shape(name):
+    page = (NODE_PAGES / f"{name}.md").read_text()
+    title, *sections = re.findall(r"^##? (.+)$", re.sub(r"```.*?```", "", page, flags=re.DOTALL), re.MULTILINE)
+    assert title == name
+    assert sections == ["Usage", "Topics", "Services", "Diagnostics", "Exit codes", "Parameters"]
+    assert page.split("## Usage")[0].strip().count("\n") > 1, "what it is for comes first"
+    assert f"ros2 run robot_formation {name} --ros-args" in page
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_topics_of_poses_pictures_and_blocks_name_their_frame(kind):
+    stamped = r"(geometry|nav|sensor)_msgs/msg/(?!JointState)"
+    rows = re.findall(
+        rf"^\| (?:reads|writes) \| `([^`]+)` \| {stamped}\w+ \| \w+ \| (.*?) \|",
+        (NODE_PAGES / f"{kind}.md").read_text(),
+        re.MULTILINE,
+    )
+    assert [topic for topic, _, frame in rows if not frame.strip()] == []
+
+
 @pytest.mark.parametrize("name", [*NODES, "common"])
 def test_a_pages_parameter_table_is_up_to_date(name):
     before, after = TABLES.updated(name, TABLES.parameter_classes()[name])
@@ -100,7 +134,7 @@ def test_a_pages_parameter_table_is_up_to_date(name):
 
 @pytest.mark.parametrize("name", NODES)
 def test_every_parameter_of_a_node_is_on_its_page(name):
-    parameters = RecorderParameters if name == "recorder" else KINDS[name].parameter_class()
+    parameters = TABLES.parameter_classes()[name]
     page = (NODE_PAGES / f"{name}.md").read_text()
     assert [parameter for parameter in specs(parameters) if f"\n| `{parameter}` |" not in page] == []
 

@@ -89,9 +89,11 @@ def test_parameters_are_checked_when_they_are_set(lab):
     stranger = Stranger(lab)
     for name, value, says in (
         ("surface", "bowel", "did you mean 'bowl'"),
-        ("robots", ["leader"], "start_x_m"),
+        ("robots", ["leader"], "it decides on topics"),
+        ("start_x_m", [0.5], "start_x_m"),
+        ("surfase", "bowl", "did you mean 'surface'"),
         ("start_x_m", [5.0, 0.5], "beyond the plate"),
-        ("wait_for_listeners_s", 1.0, "read-only"),
+        ("wait_for_listeners_s", 1.0, "used while the node starts"),
     ):
         result = stranger.set(**{name: value})
         assert not result.successful

@@ -100,6 +100,18 @@ def test_a_scenario_file_and_a_surface_are_taken(launch_file, tmp_path):
     assert nodes["world"]["surface"] == "plane"
 
 
+def test_rviz_is_started_beside_the_nodes_and_does_not_end_the_run(launch_file):
+    def started(**arguments):
+        defaults = {name: default for name, (default, _) in launch_file.ARGUMENTS.items()}
+        return [node.options for node in launch_file.nodes({**defaults, **arguments})]
+
+    (viewer,) = started(rviz="true")[len(started()) :]
+    assert viewer["package"] == viewer["executable"] == "rviz2"
+    assert Path(viewer["arguments"][1]).is_file()
+    assert "on_exit" not in viewer
+    assert all("on_exit" in options for options in started())
+
+
 def test_every_launch_argument_is_declared_and_discovery_stays_here(launch_file):
     (actions,) = launch_file.generate_launch_description().arguments
     declared = [action.arguments[0] for action in actions if type(action).__name__ == "DeclareLaunchArgument"]

@@ -254,3 +254,16 @@ def test_robots_that_are_put_back_to_their_starts_are_found_there_at_once():
         assert found[name][:2] == pytest.approx(place, abs=1e-3)
     tracker.update(dots_picture([pixel(*place) for place in starts.values()]))
     assert not tracker.restarted
+
+
+def test_another_threshold_and_calibration_count_from_the_next_picture_on_and_tracks_go_on():
+    tracker, _ = follow({"leader": line((0.5, 0.5), (0.9, 0.5), 20)})
+    starts = {"leader": (0.5, 0.5)}
+    tracker.configure(
+        from_mapping(OverheadTrackingParameters, {"good": FLAT, "threshold": 254}, where="test"), PLANE, starts
+    )
+    assert tracker.update(dots_picture([pixel(0.9, 0.5)]) // 2) == {}
+    moved = {**FLAT, "x_m": 0.89 + 0.1}
+    tracker.configure(from_mapping(OverheadTrackingParameters, {"good": moved}, where="test"), PLANE, starts)
+    found = tracker.update(dots_picture([pixel(0.9, 0.5)]))
+    assert found["leader"][:2] == pytest.approx((1.0, 0.5), abs=2e-3)

@@ -107,6 +107,12 @@ def test_each_node_is_an_executable_of_its_name(setup_arguments):
     }
 
 
+def test_no_executable_loads_ros_before_it_takes_signals(setup_arguments):
+    targets = [script.split(" = ")[1].split(":")[0] for script in setup_arguments["entry_points"]["console_scripts"]]
+    code = f"import sys, {', '.join(targets)}; sys.exit('rclpy' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
 def test_every_file_of_config_and_launch_is_installed_to_its_place(setup_arguments):
     installed = {f"{place}/{Path(file).name}": file for place, files in setup_arguments["data_files"] for file in files}
     for folder in ("config", "launch"):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import yaml
 
@@ -44,31 +44,67 @@ class Span:
         return max(0, self.last_ns - self.first_ns)
 
 
-def bag_information(file_name: str, topics: Sequence[TopicSummary], span: Span) -> dict[str, Any]:
-    """Build `rosbag2_bagfile_information` of a bag with one MCAP file, keys in rosbag2's order."""
-    count = sum(topic.message_count for topic in topics)
-    start = {"nanoseconds_since_epoch": span.first_ns}
-    duration = {"nanoseconds": span.duration_ns}
-    file = {
-        "path": file_name,
-        "starting_time": dict(start),
-        "duration": dict(duration),
-        "message_count": count,
-    }
+class FileLike(Protocol):
+    """What `merged` needs to know of a storage file."""
+
+    summaries: dict[str, TopicSummary]
+
+
+def merged(files: Sequence[FileLike]) -> list[TopicSummary]:
+    """Add the topics of several files up, in the order of their first appearance."""
+    found: dict[str, TopicSummary] = {}
+    for file in files:
+        for name, summary in file.summaries.items():
+            if name in found:
+                found[name].message_count += summary.message_count
+            else:
+                found[name] = replace(summary)
+    return list(found.values())
+
+
+def bag_information(files: Sequence[tuple[str, int, Span]], topics: Sequence[TopicSummary]) -> dict[str, Any]:
+    """Build `rosbag2_bagfile_information` of a bag, keys in rosbag2's order.
+
+    Args:
+        files: name, number of messages and span of each MCAP file.
+        topics: all topics with the messages in all files.
+    """
+    whole = Span()
+    for _, count, span in files:
+        if count:
+            whole.include(span.first_ns)
+            whole.include(span.last_ns)
     return {
         "version": VERSION,
         "storage_identifier": "mcap",
-        "duration": duration,
-        "starting_time": start,
-        "message_count": count,
+        **_times(whole),
+        "message_count": sum(count for _, count, _ in files),
         "topics_with_message_count": [_topic(topic) for topic in topics],
         # Chunks are compressed inside the MCAP file, which rosbag2 doesn't count as compression of the bag.
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file_name],
-        "files": [file],
+        "relative_file_paths": [name for name, _, _ in files],
+        "files": [_file(*file) for file in files],
         "custom_data": None,
         "ros_distro": ROS_DISTRO,
+    }
+
+
+def _times(span: Span) -> dict[str, Any]:
+    return {
+        "duration": {"nanoseconds": span.duration_ns},
+        "starting_time": {"nanoseconds_since_epoch": span.first_ns},
+    }
+
+
+def _file(name: str, message_count: int, span: Span) -> dict[str, Any]:
+    times = _times(span)
+    # In the list of files rosbag2 has the two the other way round.
+    return {
+        "path": name,
+        "starting_time": times["starting_time"],
+        "duration": times["duration"],
+        "message_count": message_count,
     }
 
 

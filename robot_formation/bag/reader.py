@@ -14,9 +14,12 @@ from rosbags.highlevel import AnyReader
 
 from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.recover import mcap_files, recover
-from robot_formation.bag.writer import PARTIAL_SUFFIX
+from robot_formation.bag.metadata import TopicSummary
+from robot_formation.bag.place import PARTIAL_SUFFIX
+from robot_formation.bag.qos import TopicQos
+from robot_formation.bag.recover import in_order, mcap_files, recover
 
+_STORAGES = (".mcap", ".db3")
 _END_MAGIC = b"\x89MCAP0\r\n"
 
 
@@ -27,6 +30,15 @@ class BagMessage(NamedTuple):
     type_name: str
     stamp_ns: int
     message: Any
+
+
+class RawMessage(NamedTuple):
+    """One message as it was recorded: topic, type, the bag's stamp (log time, nanoseconds), and its CDR."""
+
+    topic: str
+    type_name: str
+    stamp_ns: int
+    cdr: bytes
 
 
 class Bag:
@@ -52,14 +64,50 @@ class Bag:
         return {connection.topic: connection.msgtype for connection in self._reader.connections if connection.msgcount}
 
     @property
+    def contents(self) -> list[TopicSummary]:
+        """Every declared topic with its number of messages, sorted by name; empty topics included."""
+        found: dict[str, TopicSummary] = {}
+        for connection in sorted(self._reader.connections, key=lambda connection: str(connection.topic)):
+            offered = tuple(_qos(profile) for profile in connection.ext.offered_qos_profiles)
+            topic = TopicSummary(
+                connection.topic, connection.msgtype, connection.digest, offered, int(connection.msgcount)
+            )
+            known = found.setdefault(connection.topic, topic)
+            if known is not topic:  # one channel per file, or per publisher
+                known.message_count += topic.message_count
+                known.profiles += tuple(profile for profile in offered if profile not in known.profiles)
+        return list(found.values())
+
+    @property
+    def ros_distro(self) -> str:
+        """ROS distribution that recorded the bag; empty if it doesn't say."""
+        return next((str(reader.ros_distro) for reader in self._reader.readers if reader.ros_distro), "")
+
+    @property
+    def outer_compression(self) -> str:
+        """rosbag2's own compression of the bag, of whole files or of single messages; empty for none."""
+        kinds = {(reader.compression_format, reader.compression_mode) for reader in self._reader.readers}
+        return ", ".join(f"{form} ({mode})" for form, mode in sorted(kinds, key=str) if mode)
+
+    @property
     def message_count(self) -> int:
         """Messages in the bag."""
         return int(self._reader.message_count)
 
     @property
+    def start_ns(self) -> int:
+        """Stamp of the first message, nanoseconds; 0 in an empty bag."""
+        return int(self._reader.start_time) if self.message_count else 0
+
+    @property
+    def end_ns(self) -> int:
+        """Stamp of the last message, nanoseconds; 0 in an empty bag."""
+        return int(self._reader.end_time) - 1 if self.message_count else 0
+
+    @property
     def duration_s(self) -> float:
         """Seconds from the first message's stamp to the last one's."""
-        return float(max(0, self._reader.end_time - 1 - self._reader.start_time)) * 1e-9
+        return (self.end_ns - self.start_ns) * 1e-9
 
     def metadata(self, name: str) -> dict[str, str]:
         """Return the MCAP metadata of this name; later records add to and replace values of earlier ones."""
@@ -88,16 +136,39 @@ class Bag:
         Raises:
             BagError: the bag is corrupted.
         """
+        for raw in self.raw_messages(topics):
+            try:
+                message = self._reader.deserialize(raw.cdr, raw.type_name)
+            except Exception as error:  # rosbags' decoders have no common error
+                raise _corrupted(self.path, error) from error
+            yield BagMessage(raw.topic, raw.type_name, raw.stamp_ns, message)
+
+    def raw_messages(
+        self, topics: Collection[str], start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[RawMessage]:
+        """Yield the messages of these topics as they were recorded, in the order of their stamps.
+
+        Args:
+            topics: their names.
+            start_ns: leave out what is earlier.
+            stop_ns: leave out this and what is later.
+
+        Raises:
+            BagError: the bag is corrupted.
+        """
         connections = [connection for connection in self._reader.connections if connection.topic in topics]
         if not connections:
             return
-        try:
-            for connection, stamp_ns, data in self._reader.messages(connections=connections):
-                message = self._reader.deserialize(data, connection.msgtype)
-                yield BagMessage(connection.topic, connection.msgtype, stamp_ns, message)
-        # rosbags lets errors of its decompressors and decoders through, which have no common base.
-        except Exception as error:
-            raise _corrupted(self.path, error) from error
+        found = self._reader.messages(connections=connections, start=start_ns, stop=stop_ns)
+        while True:
+            try:
+                connection, stamp_ns, data = next(found)
+            except StopIteration:
+                return
+            # rosbags lets errors of its decompressors through, which have no common base.
+            except Exception as error:
+                raise _corrupted(self.path, error) from error
+            yield RawMessage(connection.topic, connection.msgtype, stamp_ns, bytes(data))
 
     def close(self) -> None:
         """Close the bag and remove what was recovered for reading."""
@@ -112,11 +183,15 @@ class Bag:
         self.close()
 
 
-def read_bag(path: str | Path) -> Bag:
+def read_bag(path: str | Path, *, allow_empty: bool = False) -> Bag:
     """Open a bag: a finished folder, one .mcap or .db3 file, or one whose writer was killed.
 
     An unclosed bag (a `.partial` folder, a folder without metadata.yaml, an MCAP file without its end) is recovered
     into a temporary folder, which is removed when the bag is closed.
+
+    Args:
+        path: the bag.
+        allow_empty: whether a bag without messages is one.
 
     Raises:
         BagError: the path is missing, not a bag, empty or corrupted.
@@ -125,16 +200,25 @@ def read_bag(path: str | Path) -> Bag:
     stack = ExitStack()
     try:
         readable = _recovered(asked, stack) if _is_unclosed(asked) else asked
-        reader = AnyReader([readable], default_typestore=jazzy_typestore())
+        # SQLite bags without metadata.yaml: their writer was killed, but the files are whole.
+        loose = readable.is_dir() and not (readable / "metadata.yaml").exists()
+        reader = AnyReader(storage_files(readable) if loose else [readable], default_typestore=jazzy_typestore())
         stack.enter_context(reader)
         bag = Bag(asked, reader, _metadata_records(readable), stack)
-        if bag.message_count == 0:
+        if bag.message_count == 0 and not allow_empty:
             raise BagError(f"{asked} is empty: it holds no messages")
     except Exception as error:
         stack.close()
         raise _corrupted(asked, error) from error
     bag.recovered = readable is not asked
     return bag
+
+
+def storage_files(path: Path) -> list[Path]:
+    """List a bag's storage files in order, whichever storage it is."""
+    if not path.is_dir():
+        return [path]
+    return sorted((file for kind in _STORAGES for file in path.glob(f"*{kind}*")), key=in_order)
 
 
 def bag_name(path: str | Path) -> str:
@@ -168,12 +252,29 @@ def _recovered(path: Path, stack: ExitStack) -> Path:
 
 
 def _metadata_records(path: Path) -> list[tuple[str, dict[str, str]]]:
-    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path] if path.suffix == ".mcap" else []
+    files = sorted(path.glob("*.mcap"), key=in_order) if path.is_dir() else [path] if path.suffix == ".mcap" else []
     records: list[tuple[str, dict[str, str]]] = []
     for file in files:
         with file.open("rb") as stream:
             records.extend((record.name, record.metadata) for record in make_reader(stream).iter_metadata())
     return records
+
+
+def _qos(profile: Any) -> TopicQos:
+    """Convert rosbags' profile."""
+    times = (profile.deadline, profile.lifespan, profile.liveliness_lease_duration)
+    deadline_ns, lifespan_ns, lease_ns = (time.sec * 10**9 + time.nsec for time in times)
+    return TopicQos(
+        profile.history.name.lower(),
+        max(0, profile.depth),
+        profile.reliability.name.lower(),
+        profile.durability.name.lower(),
+        deadline_ns,
+        lifespan_ns,
+        "unknown" if profile.liveliness.name == "MANUAL_BY_NODE" else profile.liveliness.name.lower(),
+        lease_ns,
+        profile.avoid_ros_namespace_conventions,
+    )
 
 
 def _corrupted(path: Path, error: Exception) -> BagError:

@@ -6,36 +6,41 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
-from robot_formation.bag.definitions import jazzy_typestore
+from robot_formation.bag.definitions import Definition, jazzy_typestore
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.transforms import Transforms
-from robot_formation.bag.writer import BagWriter
+from robot_formation.bag.writer import DEFAULT_OPTIONS, BagWriter, WriteOptions
 
-_CHUNK_BYTES = 1 << 20
 _TIME_FIRST = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
 METADATA_NAME = "robot_formation"
 
 
 class Recorder:
-    """Writes messages into a bag. Their log time is simulated: their own stamp, or the latest one seen before them.
+    """Writes messages into a bag.
 
-    It adds /tf and /tf_static, made of true poses and robot descriptions, when it ends a chunk.
+    Their log time is simulated: their own stamp, or the latest one seen before them; or, where `record` is told when
+    they came, that time. It adds /tf and /tf_static, made of true poses and robot descriptions, when it ends a chunk.
     """
 
-    def __init__(self, path: Path, metadata: Mapping[str, str]) -> None:
+    def __init__(self, path: Path, metadata: Mapping[str, str], options: WriteOptions = DEFAULT_OPTIONS) -> None:
         """Open the bag.
+
+        Args:
+            path: the bag's folder, which must not exist.
+            metadata: texts of the MCAP metadata record `robot_formation`.
+            options: how the files are written.
 
         Raises:
             BagError: if the path is taken or can't be written.
         """
-        self._writer = BagWriter(path)
+        self._writer = BagWriter(path, options=options)
+        self._chunk_bytes = options.chunk_bytes
         if metadata:
             self._writer.write_metadata(METADATA_NAME, metadata)
         self._topics: set[str] = set()
         self._own: set[str] = set()
         self._transforms = Transforms()
         self._now_ns = 0
-        self._pending_bytes = 0
 
     @property
     def topics(self) -> set[str]:
@@ -43,37 +48,63 @@ class Recorder:
         return self._topics
 
     @property
+    def now_ns(self) -> int:
+        """The latest stamp so far, nanoseconds: that of messages that have none of their own."""
+        return self._now_ns
+
+    @property
     def message_count(self) -> int:
         """Messages recorded so far."""
         return self._writer.message_count
 
-    def add_topic(self, name: str, type_name: str, qos: TopicQos) -> None:
-        """Declare a topic once."""
-        self._writer.add_topic(name, type_name, qos)
+    @property
+    def message_counts(self) -> dict[str, int]:
+        """Messages recorded so far, by topic."""
+        return self._writer.message_counts
+
+    def add_topic(
+        self, name: str, type_name: str, qos: TopicQos | tuple[TopicQos, ...], *, embedded: Definition | None = None
+    ) -> None:
+        """Declare a topic once; arguments as for `BagWriter.add_topic`."""
+        self._writer.add_topic(name, type_name, qos, embedded=embedded)
         self._topics.add(name)
 
-    def record(self, topic: str, type_name: str, cdr: bytes) -> None:
-        """Write one serialised message of a declared topic."""
-        stamp_ns = own_stamp(type_name, cdr)
+    def record(self, topic: str, type_name: str, cdr: bytes, received_ns: int | None = None) -> None:
+        """Write one serialised message of a declared topic.
+
+        Args:
+            topic: its topic.
+            type_name: its type in full.
+            cdr: the message with its encapsulation header.
+            received_ns: when it came, nanoseconds, to keep receive times; None for simulated time.
+        """
+        stamp_ns = own_stamp(type_name, cdr) if received_ns is None else received_ns
         if stamp_ns is None:
             stamp_ns = self._now_ns
         else:
             self._now_ns = max(self._now_ns, stamp_ns)
-        self._writer.write(topic, cdr, stamp_ns)
+        # A middleware delivers payloads in words of four bytes (DDSI-RTPS 2.3, section 9.4): so do all our bags.
+        self._writer.write(topic, cdr + bytes(-len(cdr) % 4), stamp_ns)
         self._transforms.take(topic, type_name, cdr, stamp_ns)
-        self._pending_bytes += len(cdr)
-        if self._pending_bytes > _CHUNK_BYTES:
+        if self._writer.open_bytes >= self._chunk_bytes:
             self.end_chunk()
+
+    def write_metadata(self, metadata: Mapping[str, str]) -> None:
+        """Add to the metadata record; later values replace earlier ones."""
+        self._writer.write_metadata(METADATA_NAME, metadata)
 
     def end_chunk(self) -> None:
         """Make what was recorded so far survive the recorder's death."""
-        if self._pending_bytes:
+        if self._writer.open_bytes:
             self._add_transforms()
             self._writer.end_chunk()
-            self._pending_bytes = 0
 
     def close(self) -> Path:
-        """Finish the bag; return its path."""
+        """Finish the bag; return its path.
+
+        Raises:
+            BagError: the disk refuses; the `.partial` folder stays.
+        """
         try:
             self._add_transforms()
         finally:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -14,8 +16,12 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from robot_formation.bag.definitions import Definition
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.metadata import Span
 from robot_formation.bag.qos import parse_profiles
 from robot_formation.bag.writer import BagWriter
+
+RECOVERING_SUFFIX = ".recovering"
+"""What the new bag's folder is called behind its name while the old one is being copied into it."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +32,7 @@ class RecoverReport:
         path: the new bag.
         messages: messages saved.
         message_counts: the same by topic.
+        first_stamp_ns: log time of the earliest message saved, nanoseconds.
         last_stamp_ns: log time of the latest message saved, nanoseconds.
         complete: the old bag's data section had its end, so nothing is missing behind it.
         damaged_chunks: chunks inside the file that failed their checksum and were left out.
@@ -35,6 +42,7 @@ class RecoverReport:
     path: Path
     messages: int
     message_counts: dict[str, int]
+    first_stamp_ns: int
     last_stamp_ns: int
     complete: bool
     damaged_chunks: int
@@ -49,19 +57,22 @@ def recover(partial_path: str | Path, out_path: str | Path) -> RecoverReport:
         out_path: the new bag's folder.
 
     Raises:
-        BagError: there is no such bag, it isn't MCAP with profile ros2, no message can be read from it, or the new
-            bag's path is taken or can't be written.
+        BagError: there is no such bag, it isn't MCAP with profile ros2, no message can be
+            read from it, or the new bag's path is taken or can't be written.
     """
     source = Path(partial_path)
     copy = _Copy(source, Path(out_path))
     try:
         for file in mcap_files(source):
             copy.read(file)
-    except OSError as error:
-        raise BagError(f"{source} can't be read: {error.strerror or error}") from error
-    finally:
         if copy.writer is not None:
             copy.writer.close()
+    except BaseException as error:
+        if copy.writer is not None:
+            copy.writer.discard()
+        if isinstance(error, OSError):
+            raise BagError(f"{source} can't be read: {error.strerror or error}") from error
+        raise
     if copy.writer is None:
         raise BagError(
             f"{source} holds no message that can be read; its writer ended before the first chunk was closed"
@@ -70,7 +81,8 @@ def recover(partial_path: str | Path, out_path: str | Path) -> RecoverReport:
         path=copy.writer.path,
         messages=copy.writer.message_count,
         message_counts=copy.writer.message_counts,
-        last_stamp_ns=copy.last_stamp_ns,
+        first_stamp_ns=copy.span.first_ns,
+        last_stamp_ns=copy.span.last_ns,
         complete=copy.complete,
         damaged_chunks=copy.damaged_chunks,
         lost_bytes=copy.lost_bytes,
@@ -85,10 +97,32 @@ def mcap_files(path: Path) -> list[Path]:
     """
     if not path.exists():
         raise BagError(f"{path} doesn't exist; give a bag's folder or an .mcap file")
-    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    files = sorted(path.glob("*.mcap"), key=in_order) if path.is_dir() else [path]
     if not files or files[0].suffix != ".mcap":
         raise BagError(f"{path} is not a bag; give a folder that 'ros2 bag' or this project wrote, or an .mcap file")
     return files
+
+
+def is_being_written(path: Path) -> bool:
+    """Tell whether a writer of this project has one of the bag's files open.
+
+    Raises:
+        BagError: as for `mcap_files`.
+    """
+    for file in mcap_files(path):
+        with file.open("rb") as stream:
+            try:
+                fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return True
+            except OSError:  # a file system without locks
+                return False
+    return False
+
+
+def in_order(path: Path) -> list[int | str]:
+    """Return a sort key by which run_10.mcap comes after run_9.mcap."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
 
 
 @dataclass
@@ -102,7 +136,7 @@ class _Copy:
     channels: dict[int, Channel] = field(default_factory=dict)
     types: dict[str, str] = field(default_factory=dict)
     waiting_metadata: list[Metadata] = field(default_factory=list)
-    last_stamp_ns: int = 0
+    span: Span = field(default_factory=Span)
     complete: bool = True
     damaged_chunks: int = 0
     lost_bytes: int = 0
@@ -155,7 +189,7 @@ class _Copy:
         if channel is None or schema is None or channel.message_encoding != "cdr":
             return
         if self.writer is None:
-            self.writer = BagWriter(self.target)
+            self.writer = BagWriter(self.target, partial_suffix=RECOVERING_SUFFIX)
             self.flush_metadata()
         if self.types.setdefault(channel.topic, schema.name) != schema.name:
             return
@@ -166,7 +200,7 @@ class _Copy:
             profiles = parse_profiles(channel.metadata.get("offered_qos_profiles", ""))
             self.writer.add_topic(channel.topic, schema.name, profiles, embedded=embedded)
         self.writer.write(channel.topic, message.data, message.publish_time, log_time_ns=message.log_time)
-        self.last_stamp_ns = max(self.last_stamp_ns, message.log_time)
+        self.span.include(message.log_time)
 
     def flush_metadata(self) -> None:
         if self.writer is not None:

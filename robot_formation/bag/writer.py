@@ -2,79 +2,49 @@
 
 from __future__ import annotations
 
-import hashlib
-import socket
-from collections.abc import Callable, Iterator, Mapping
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
-
-from mcap.writer import CompressionType, Writer
+from typing import Any
 
 from robot_formation.bag.definitions import Definition, definition
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.metadata import Span, TopicSummary, bag_information, to_yaml
-from robot_formation.bag.qos import TopicQos, dump_profiles
+from robot_formation.bag.mcap_file import CHUNK_BYTES, COMPRESSIONS, McapFile
+from robot_formation.bag.metadata import bag_information, merged, to_yaml
+from robot_formation.bag.place import PARTIAL_SUFFIX, check_free
+from robot_formation.bag.qos import TopicQos
 
-T = TypeVar("T")
-
-PARTIAL_SUFFIX = ".partial"
-"""What a bag's folder is called while it is being written, behind its name."""
-CUT_OFF_SUFFIX = ".cut_off"
-"""What the folder of a bag whose writer died is called while the bag is being rescued."""
-
-_COMPRESSION = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
 _LAST_STAMP_NS = 2**63 - 1
 
 
-def check_free(path: Path, leftovers: tuple[str, ...] = (PARTIAL_SUFFIX, CUT_OFF_SUFFIX)) -> None:
-    """Refuse a bag's path that is taken, by a bag or by what is left of one.
+@dataclass(frozen=True)
+class WriteOptions:
+    """How a bag's files are written.
 
-    Raises:
-        BagError: naming what is there.
-    """
-    if not path.name:
-        raise BagError(f"{path} can't be a bag: give the name of a new folder")
-    for suffix in ("", *leftovers):
-        taken = path.with_name(path.name + suffix)
-        if taken.exists():
-            raise BagError(f"{taken} exists already and is not overwritten; choose another path or remove it")
-
-
-class PathReservation:
-    """Keeps a bag's path for one run of this machine: a context manager; gone with its process, and no file is left.
-
-    Raises:
-        BagError: on entering, if another run has it.
+    Attributes:
+        compression: of the chunks: `zstd`, `lz4` or `none`.
+        chunk_bytes: a chunk that holds so much is ended before the next message.
+        split_bytes: a new file is begun when the present one is larger; 0: never.
+        split_ns: a new file is begun when the log times in the present one span more, nanoseconds; 0: never.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path.absolute()
-        self._socket: socket.socket | None = None
+    compression: str = "zstd"
+    chunk_bytes: int = CHUNK_BYTES
+    split_bytes: int = 0
+    split_ns: int = 0
 
-    def __enter__(self) -> PathReservation:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        name = hashlib.sha256(str(self._path).encode()).hexdigest()
-        try:
-            self._socket.bind(f"\0robot_formation_bag_{name}")
-        except OSError:
-            self._socket.close()
-            raise BagError(f"{self._path} is being written by another run; choose another path") from None
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._socket is not None:
-            self._socket.close()
+DEFAULT_OPTIONS = WriteOptions()
 
 
 @dataclass
 class _Topic:
-    channel_id: int
-    summary: TopicSummary
+    what: Definition
+    profiles: tuple[TopicQos, ...]
+    message_count: int = 0
     stamp_ns: int = -1
     log_time_ns: int = -1
 
@@ -90,45 +60,68 @@ class _Topic:
 class BagWriter:
     """Writes `<path>.partial/` and renames it to `<path>/` when closed: a folder without the suffix is complete.
 
-    The folder holds `<name>_0.mcap` (profile ros2, CDR, embedded definitions, chunks compressed) and `metadata.yaml`
-    (version 9, as ROS 2 Jazzy writes it). Use it as a context manager; it is closed, and complete as far as it goes,
-    also when the block ends with an exception.
+    The folder holds `<name>_0.mcap`, `<name>_1.mcap`, ... (a file each time the bag is split; every one of them has
+    the definitions and metadata that it needs to be read alone) and `metadata.yaml` (version 9, as ROS 2 Jazzy writes
+    it). Use it as a context manager; it is closed, and complete as far as it goes, also when the block ends with an
+    exception. Once the disk has refused something, nothing more is written: the folder stays partial, to be recovered.
 
     Args:
         path: the bag's folder; missing parents are made.
-        compression: of the chunks: `zstd`, `lz4` or `none`.
+        compression: of the chunks, instead of that of the options.
+        options: how the files are written.
+        partial_suffix: what the folder is called behind its name while it is being written.
 
     Raises:
         BagError: the bag or its `.partial` exists (nothing is overwritten), or the folder can't be made.
     """
 
-    def __init__(self, path: str | Path, *, compression: str = "zstd") -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        compression: str | None = None,
+        options: WriteOptions = DEFAULT_OPTIONS,
+        partial_suffix: str = PARTIAL_SUFFIX,
+    ) -> None:
         self.path = Path(path).absolute()
-        check_free(self.path, (PARTIAL_SUFFIX,))
-        self.partial_path = self.path.with_name(self.path.name + PARTIAL_SUFFIX)
-        if compression not in _COMPRESSION:
-            raise BagError(f"compression can't be {compression!r}; there are: {', '.join(_COMPRESSION)}")
+        check_free(self.path, (partial_suffix,))
+        self.partial_path = self.path.with_name(self.path.name + partial_suffix)
+        self._options = options if compression is None else replace(options, compression=compression)
+        if self._options.compression not in COMPRESSIONS:
+            given = self._options.compression
+            raise BagError(f"compression can't be {given!r}; there are: {', '.join(COMPRESSIONS)}")
         self._topics: dict[str, _Topic] = {}
-        self._schemas: dict[str, int] = {}
-        self._span = Span()
+        self._records: list[tuple[str, dict[str, str]]] = []
+        self._finished: list[McapFile] = []
         self._closed = False
-        self.file_name = f"{self.path.name}_0.mcap"
+        self._failure: BagError | None = None
         with self._system_errors():
             self.partial_path.mkdir(parents=True)
-            self._file = (self.partial_path / self.file_name).open("xb")
-            self._mcap = Writer(self._file, compression=_COMPRESSION[compression])
-            self._mcap.start(profile="ros2")
-            self._file.flush()
+            try:
+                self._file = self._next_file()
+            except OSError:
+                shutil.rmtree(self.partial_path, ignore_errors=True)  # nothing in it yet
+                raise
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file that is being written."""
+        return self._file.path.name
+
+    @property
+    def open_bytes(self) -> int:
+        """Bytes in the chunk that is not closed yet: what a killed writer would lose."""
+        return self._file.open_bytes
 
     @property
     def message_count(self) -> int:
         """Messages written so far."""
-        return sum(topic.summary.message_count for topic in self._topics.values())
+        return sum(topic.message_count for topic in self._topics.values())
 
     @property
     def message_counts(self) -> dict[str, int]:
         """Messages written so far, by topic."""
-        return {name: topic.summary.message_count for name, topic in self._topics.items()}
+        return {name: topic.message_count for name, topic in self._topics.items()}
 
     def add_topic(
         self,
@@ -153,13 +146,10 @@ class BagWriter:
         if name in self._topics:
             raise BagError(f"{self.path}: topic '{name}' was added before; add each topic once")
         what = embedded or definition(type_name)
-        profiles = (qos,) if isinstance(qos, TopicQos) else qos
-        if type_name not in self._schemas:
-            text = what.text.encode()
-            self._schemas[type_name] = self._do(self._mcap.register_schema, type_name, what.encoding, text)
-        metadata = {"offered_qos_profiles": dump_profiles(profiles), "topic_type_hash": what.type_hash}
-        channel = self._do(self._mcap.register_channel, name, "cdr", self._schemas[type_name], metadata)
-        self._topics[name] = _Topic(channel, TopicSummary(name, type_name, what.type_hash, profiles))
+        entry = _Topic(what, (qos,) if isinstance(qos, TopicQos) else qos)
+        with self._system_errors():
+            self._file.add_topic(name, what, entry.profiles)
+        self._topics[name] = entry
 
     def write(self, topic: str, cdr: bytes, stamp_ns: int, *, log_time_ns: int | None = None) -> None:
         """Append one serialised message.
@@ -183,9 +173,15 @@ class BagWriter:
         log_time = entry.next_log_time(stamp_ns) if log_time_ns is None else log_time_ns
         if not (0 <= stamp_ns <= _LAST_STAMP_NS and 0 <= log_time <= _LAST_STAMP_NS):
             raise BagError(f"{self.path}: '{topic}' has a message stamped {stamp_ns} ns; give stamps of 0 to 2^63 - 1")
-        self._do(self._mcap.add_message, entry.channel_id, log_time, cdr, stamp_ns, entry.summary.message_count)
-        entry.summary.message_count += 1
-        self._span.include(log_time)
+        try:
+            if self._file.open_bytes >= self._options.chunk_bytes:
+                self._file.end_chunk()
+            if self._is_full(log_time):
+                self._split()
+            self._file.write(topic, cdr, log_time, stamp_ns)
+        except OSError as error:
+            raise self._unwritable(error) from error
+        entry.message_count += 1
 
     def end_chunk(self) -> None:
         """Close the current chunk and hand it to the operating system: what was written survives SIGKILL.
@@ -196,10 +192,11 @@ class BagWriter:
             BagError: the file can't be written.
         """
         self._check_open()
-        self._do(self._mcap.flush)
+        with self._system_errors():
+            self._file.end_chunk()
 
     def write_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write an MCAP metadata record at this place of the file.
+        """Write an MCAP metadata record at this place, and at the beginning of every later file.
 
         Raises:
             BagError: a value isn't a string, or the file can't be written.
@@ -208,7 +205,9 @@ class BagWriter:
         wrong = [key for key, value in values.items() if not isinstance(value, str)]
         if wrong:
             raise BagError(f"{self.path}: metadata '{name}' must hold strings only; convert {', '.join(wrong)}")
-        self._do(self._mcap.add_metadata, name, dict(values))
+        self._records.append((name, dict(values)))
+        with self._system_errors():
+            self._file.write_metadata(name, values)
 
     def close(self) -> Path:
         """Finish the file, write `metadata.yaml` and give the folder its final name; return its path.
@@ -219,19 +218,22 @@ class BagWriter:
         if self._closed:
             return self.path
         self._closed = True
-        summaries = [topic.summary for topic in self._topics.values()]
-        information = bag_information(self.file_name, summaries, self._span)
-        with self._system_errors(), self._file:
-            # rosbag2 looks up in this record which version the channels' QoS text follows.
-            self._mcap.add_metadata("rosbag2", {"serialized_metadata": to_yaml(information)})
-            self._mcap.finish()
+        with self._system_errors():
+            self._finish_file()
         if self.path.exists():
             raise BagError(f"{self.path} was made by somebody else meanwhile; the bag stays in {self.partial_path}")
         with self._system_errors():
-            text = to_yaml({"rosbag2_bagfile_information": information})
+            text = to_yaml({"rosbag2_bagfile_information": self._information(self._finished)})
             (self.partial_path / "metadata.yaml").write_text(text, encoding="utf-8")
             self.partial_path.rename(self.path)
         return self.path
+
+    def discard(self) -> None:
+        """Remove what was written of a bag that is not closed."""
+        if self.partial_path.exists():
+            self._closed = True
+            self._file.abandon()
+            shutil.rmtree(self.partial_path)
 
     def __enter__(self) -> BagWriter:
         return self
@@ -241,15 +243,41 @@ class BagWriter:
     ) -> None:
         self.close()
 
+    def _is_full(self, log_time_ns: int) -> bool:
+        options, file = self._options, self._file
+        if file.message_count == 0:
+            return False
+        too_large = 0 < options.split_bytes < file.bytes_written
+        return too_large or 0 < options.split_ns < log_time_ns - file.span.first_ns
+
+    def _split(self) -> None:
+        self._finish_file()
+        self._file = self._next_file()
+
+    def _next_file(self) -> McapFile:
+        """Begin a file with the topics and metadata of those before it."""
+        path = self.partial_path / f"{self.path.name}_{len(self._finished)}.mcap"
+        file = McapFile(path, compression=self._options.compression)
+        for name, values in self._records:
+            file.write_metadata(name, values)
+        for name, topic in self._topics.items():
+            file.add_topic(name, topic.what, topic.profiles)
+        return file
+
+    def _finish_file(self) -> None:
+        # rosbag2 looks up in this record which version the channels' QoS text follows.
+        self._file.write_metadata("rosbag2", {"serialized_metadata": to_yaml(self._information([self._file]))})
+        self._file.finish()
+        self._finished.append(self._file)
+
+    def _information(self, files: Sequence[McapFile]) -> dict[str, Any]:
+        return bag_information([(file.path.name, file.message_count, file.span) for file in files], merged(files))
+
     def _check_open(self) -> None:
+        if self._failure is not None:
+            raise self._failure
         if self._closed:
             raise BagError(f"{self.path} is closed; nothing more can be written to it")
-
-    def _do(self, action: Callable[..., T], *arguments: Any) -> T:
-        try:
-            return action(*arguments)
-        except OSError as error:
-            raise self._unwritable(error) from error
 
     @contextmanager
     def _system_errors(self) -> Iterator[None]:
@@ -259,6 +287,12 @@ class BagWriter:
             raise self._unwritable(error) from error
 
     def _unwritable(self, error: OSError) -> BagError:
-        return BagError(
-            f"{self.path}: can't write the bag: {error.strerror or error}; free space or choose another path"
-        )
+        """Give the bag up: what the disk has taken stays, to be recovered."""
+        self._closed = True
+        text = f"{self.path}: can't write the bag: {error.strerror or error}; free space or choose another path"
+        if hasattr(self, "_file"):
+            self._file.abandon()
+        if hasattr(self, "_file") and self.partial_path.suffix == PARTIAL_SUFFIX:
+            text += f" ('formation recover {self.partial_path}' saves what was written)"
+        self._failure = BagError(text)
+        return self._failure

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from robot_formation.names import Topic
 
@@ -47,12 +47,12 @@ class Place:
 class Component:
     """Base of all components. The host calls `attach` once, then `start`, then the inputs' handlers in order.
 
-    A component that has finished sets `exit_code`; its host then ends with it. `settable` components take changed
-    parameters after the start. A host that reports health gives a `wall_clock` (seconds, from any origin), to measure
-    how long work takes and for nothing else.
+    A component that has finished sets `exit_code`; its host then ends with it. A host that reports health gives a
+    `wall_clock` (seconds, from any origin), to measure how long work takes and for nothing else.
     """
 
-    settable = False
+    fixed: ClassVar[Mapping[str, str]] = {"*": "a run's results rest on it from the start on"}
+    """Which parameters can't be set after the start, by shell pattern, and why; `set_parameters` takes the others."""
 
     def __init__(self, place: Place) -> None:
         self.place = place
@@ -87,7 +87,7 @@ class Component:
         return {}
 
     def set_parameters(self, parameters: Any) -> None:
-        """Take changed parameters, an object of the component's parameter class; asked for only if `settable`.
+        """Take changed parameters, an object of the component's parameter class, in which those `fixed` are as before.
 
         Raises:
             FormationError: to refuse them.

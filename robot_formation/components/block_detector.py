@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 import statistics
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import cv2
 
@@ -46,7 +47,7 @@ class BlockDetectorNodeParameters(DetectorParameters):
 class BlockDetectorComponent(Component):
     """Answers each picture with its blocks, in the picture's frame and with its stamp."""
 
-    settable = True
+    fixed: ClassVar[Mapping[str, str]] = {}
 
     def __init__(self, parameters: BlockDetectorNodeParameters, place: Place) -> None:
         super().__init__(place)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.control.calibration import calibrated
 from robot_formation.control.drive import Drive, DriveAction, DriveParameters
+from robot_formation.parameters import ParameterError
 
 # Encoder wheels: half a pulse of 0.233 mm and 0.3 % of 5 cm, rounded up, as one standard deviation each way.
 _VARIANCE_M2 = (0.0002**2, 0.0, 0.0, 0.0002**2)
@@ -18,10 +19,13 @@ _VARIANCE_M2 = (0.0002**2, 0.0, 0.0, 0.0002**2)
 class DriveComponent(Component):
     """Turns `move` into `joint_commands` and `joint_states` into `moved` and `odom`."""
 
+    fixed: ClassVar[Mapping[str, str]] = {}
+
     def __init__(self, parameters: DriveParameters, place: Place) -> None:
         super().__init__(place)
         self._drive = Drive(calibrated(parameters, place.robot))
         self._calibration = parameters.calibration_file or "by parameters"
+        self._last: Callable[[Drive], Any] = lambda drive: None
         listener = "leader" if place.robot == names.LEADER else "fine_tuner"
         self._moved = replace(names.MOVED, listeners=(listener,))
 
@@ -37,6 +41,21 @@ class DriveComponent(Component):
         """See `Component`."""
         return {"drive/stop": self._on_stop}
 
+    def set_parameters(self, parameters: DriveParameters) -> None:
+        """See `Component`: taken between moves; odometry goes on.
+
+        Raises:
+            ParameterError: while a move is under way.
+            CalibrationError: if the calibration file can't be used.
+        """
+        if self._drive.busy:
+            raise ParameterError("drive: a move is under way; set parameters after 'moved'")
+        drive = Drive(calibrated(parameters, self.place.robot))
+        drive.odometry = self._drive.odometry
+        self._last(drive)  # where the joints stand
+        self._drive = drive
+        self._calibration = parameters.calibration_file or "by parameters"
+
     def details(self) -> dict[str, str]:
         """See `Component`."""
         return {"moving": str(self._drive.busy), "calibration": self._calibration}
@@ -51,8 +70,10 @@ class DriveComponent(Component):
         except conversions.MessageError as error:
             self.warn(str(error))
             return
-        self.stamp_ns = conversions.stamp_of(message)
-        self._act(self._drive.joint_states(self.stamp_ns, positions, velocities, message.header.frame_id))
+        self.stamp_ns = stamp_ns = conversions.stamp_of(message)
+        number = message.header.frame_id
+        self._last = lambda drive: drive.joint_states(stamp_ns, positions, velocities, number)
+        self._act(self._last(self._drive))
 
     def _on_stop(self) -> tuple[bool, str]:
         action = self._drive.stop()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.parameters import ParameterError, parameter
-from robot_formation.surface import surface_from_texts
+from robot_formation.surface import Surface, surface_from_texts
 from robot_formation.vision.overhead_tracking import OverheadTracker, OverheadTrackingParameters
 
 
@@ -32,15 +33,23 @@ class OverheadTrackerNodeParameters(OverheadTrackingParameters):
         if len(lengths) != 1 or len(set(self.robots)) != len(self.robots):
             raise ParameterError("overhead_tracker: 'robots' must differ and have one start_x_m and start_y_m each")
 
+    def starts(self) -> dict[str, tuple[float, float]]:
+        """List where each robot begins: x and y in the world, metres."""
+        return dict(zip(self.robots, zip(self.start_x_m, self.start_y_m, strict=True), strict=True))
+
+    def make_surface(self) -> Surface:
+        """Build the surface that the parameters name."""
+        return surface_from_texts(self.surface, self.surface_parameters)
+
 
 class OverheadTrackerComponent(Component):
     """Answers each picture with the places of all robots' dots, and with the paths of those that were seen."""
 
+    fixed: ClassVar[Mapping[str, str]] = {"robots": "it decides on topics; start another tracker"}
+
     def __init__(self, parameters: OverheadTrackerNodeParameters, place: Place) -> None:
         super().__init__(place)
-        surface = surface_from_texts(parameters.surface, parameters.surface_parameters)
-        places = zip(parameters.start_x_m, parameters.start_y_m, strict=True)
-        self._tracker = OverheadTracker(parameters, surface, dict(zip(parameters.robots, places, strict=True)))
+        self._tracker = OverheadTracker(parameters, parameters.make_surface(), parameters.starts())
         self._path_topics = {robot: names.overhead_path(robot) for robot in parameters.robots}
         self._paths: dict[str, list[Any]] = {robot: [] for robot in parameters.robots}
         self._pictures = 0
@@ -53,6 +62,14 @@ class OverheadTrackerComponent(Component):
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
         return [names.OVERHEAD_POSES, *self._path_topics.values()]
+
+    def set_parameters(self, parameters: OverheadTrackerNodeParameters) -> None:
+        """See `Component`: from the next picture on; tracks go on.
+
+        Raises:
+            FormationError: if the surface can't be made.
+        """
+        self._tracker.configure(parameters, parameters.make_surface(), parameters.starts())
 
     def details(self) -> dict[str, str]:
         """See `Component`."""

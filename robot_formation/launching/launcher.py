@@ -14,8 +14,8 @@ from typing import Any
 
 from robot_formation import exit_codes
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.place import CUT_OFF_SUFFIX, PARTIAL_SUFFIX, PathReservation, check_free
 from robot_formation.bag.recover import recover
-from robot_formation.bag.writer import CUT_OFF_SUFFIX, PARTIAL_SUFFIX, PathReservation, check_free
 from robot_formation.experiment.domain import DomainReservation
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import metadata as package_metadata
 from pathlib import Path
 from typing import Any
 
-import robot_formation
+from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.drive_curves import robot_curves
 from robot_formation.experiment.scenario import Scenario
@@ -76,15 +74,6 @@ def run_metadata(scenario: Scenario) -> dict[str, str]:
         "camera": world["camera.mode"],
         "parameters": json.dumps({kind: scenario.parameters(kind) for kind in KINDS}, sort_keys=True),
         "drive_curves": json.dumps(robot_curves(scenario)),
-        "versions": json.dumps(_versions()),
+        "versions": json.dumps(versions()),
+        "git_commit": git_commit(),
     }
-
-
-def _versions() -> dict[str, str]:
-    found = {"robot_formation": robot_formation.__version__, "python": platform.python_version()}
-    for package in ("numpy", "pybullet", "opencv-python-headless", "mcap"):
-        try:
-            found[package] = package_metadata.version(package)
-        except package_metadata.PackageNotFoundError:
-            found[package] = "not from pip"
-    return found

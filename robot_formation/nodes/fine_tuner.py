@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from robot_formation.nodes.host import main_of
+from robot_formation.nodes.signals import stop_on_signals
 
 
 def main() -> int:
     """Run the node until it ends."""
+    stop_on_signals()
+    from robot_formation.nodes.host import main_of
+
     return main_of("fine_tuner")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import random
-import signal
 import sys
 import time
 from collections.abc import Callable
@@ -18,7 +17,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool, Trigger
@@ -29,7 +27,9 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.outbox import Outbox
-from robot_formation.nodes.parameters import HostParameters, declare, take_changes
+from robot_formation.nodes.parameters import AT_START, HostParameters, ParameterNode, declare, take_changes
+from robot_formation.nodes.signals import stopped
+from robot_formation.parameters import specs
 
 _IDLE_S = 0.1  # how often an idle node looks for signals
 _HELD_BACK_S = 0.01  # how often it looks for listeners while messages are held back
@@ -60,18 +60,17 @@ class Runnable(Protocol):
         """Run; return the exit code."""
 
 
-def run_node(name: str, make: Callable[[Node], Runnable]) -> int:
+def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
     """Make a node and what runs on it, run and clean up; errors from outside become one line.
 
     Returns:
         The exit code: 2 if what was given at the start is bad, 1 for such an error later, else that of the run.
     """
-    # ROS's own handlers invalidate the context at once, which would lose what is still to be sent.
-    stop_on_signals()
     node, running = None, False
     try:
+        # ROS's own handlers would invalidate the context at once, and lose what is still to be sent.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        node = Node(name, allow_undeclared_parameters=False)
+        node = ParameterNode(name)
         body = make(node)
         running = True
         return body.run()
@@ -89,34 +88,15 @@ def run_node(name: str, make: Callable[[Node], Runnable]) -> int:
         rclpy.try_shutdown()
 
 
-_stop = False
-
-
-def stop_on_signals() -> None:
-    """Let SIGINT and SIGTERM set a flag that the main loops look at."""
-
-    def handler(number: int, frame: Any) -> None:
-        global _stop
-        _stop = True
-
-    signal.signal(signal.SIGINT, handler)
-    signal.signal(signal.SIGTERM, handler)
-
-
-def stopped() -> bool:
-    """Tell whether a signal has asked this process to end."""
-    return _stop
-
-
 class Host:
     """Connects one component to one rclpy node."""
 
-    def __init__(self, node: Node, kind: str) -> None:
+    def __init__(self, node: ParameterNode, kind: str) -> None:
         self._node = node
         entry = KINDS[kind]
         own, component_class = entry.parameter_class(), entry.component_class()
-        settable = (own,) if component_class.settable else ()
-        parameters, self._parameters = declare(node, own, HostParameters, settable=settable)
+        fixed = {**dict.fromkeys(specs(HostParameters), AT_START), **component_class.fixed}
+        parameters, self._parameters = declare(node, own, HostParameters, fixed=fixed)
         robot = node.get_namespace().strip("/").rpartition("/")[2]
         if entry.robots and not robot:
             raise FormationError(
@@ -126,8 +106,7 @@ class Host:
         self._pacer = Pacer(getattr(parameters, "real_time_factor", 0.0))
         self._component: Component = component_class(parameters, place)
         self._component.wall_clock = time.perf_counter
-        if settable:
-            take_changes(node, parameters, self._set_parameters)
+        take_changes(node, parameters, self._set_parameters)
         self._outbox = Outbox(
             node,
             patience_s=self._parameters.wait_for_listeners_s,

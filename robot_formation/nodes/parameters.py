@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -28,6 +29,8 @@ _TYPES: dict[Any, Parameter.Type] = {
     tuple[str, ...]: Parameter.Type.STRING_ARRAY,
 }
 _LARGE = 1e308
+AT_START = "it is used while the node starts"
+"""Why the parameters that all nodes have can't be set later."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +52,66 @@ class HostParameters:
     )
 
 
-def declare(node: Node, *classes: type, settable: tuple[type, ...] = ()) -> list[Any]:
+class ParameterNode(Node):
+    """rclpy's node, more helpful when parameters are set while it runs.
+
+    A refusal is a sentence that says why. Values take the parameter's type where that is meant (1 for 1.0, an empty
+    list). A read-only parameter that is set to the value that it has is no error, so that `ros2 param load` takes what
+    `ros2 param dump` gave.
+
+    Attributes:
+        fixed: why each read-only parameter can't be set.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.fixed: dict[str, str] = {}
+        super().__init__(name, allow_undeclared_parameters=False)
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """See rclpy's Node; both of its services for setting parameters come here."""
+        changes = []
+        for given in parameter_list:
+            if not self.has_parameter(given.name):
+                return _refused(f"no parameter '{given.name}'{suggestion(given.name, self._parameters)}")
+            current = self.get_parameter(given.name)
+            item = _like(current, given)
+            if not self.describe_parameter(item.name).read_only:
+                changes.append(item)
+            elif _bare(item.value) != _bare(current.value):
+                reason = self.fixed.get(item.name, AT_START)
+                return _refused(f"'{item.name}' can't be set while {self.get_name()} runs: {reason}")
+        return super().set_parameters_atomically(changes) if changes else SetParametersResult(successful=True)
+
+
+def _refused(reason: str) -> SetParametersResult:
+    return SetParametersResult(successful=False, reason=reason)
+
+
+def _bare(value: Any) -> Any:
+    """Make a list of the array that a message holds numbers in: an array equals no list."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _like(current: Parameter, given: Parameter) -> Parameter:
+    """Give a value the type of the parameter where it is meant so: whole numbers, and lists without elements."""
+    kind, value = current.type_, given.value
+    if kind == Parameter.Type.DOUBLE and given.type_ == Parameter.Type.INTEGER:
+        return Parameter(given.name, kind, float(value))
+    if kind.name.endswith("_ARRAY") and given.type_.name.endswith("_ARRAY"):
+        if len(value) == 0:
+            return Parameter(given.name, kind, [])
+        if kind == Parameter.Type.DOUBLE_ARRAY and given.type_ == Parameter.Type.INTEGER_ARRAY:
+            return Parameter(given.name, kind, [float(item) for item in value])
+    return given
+
+
+def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> list[Any]:
     """Declare the classes' parameters on the node and return them, filled and checked, one object per class.
 
-    Those of the classes in `settable` can be changed later, the others are read-only.
+    Args:
+        node: where they are declared.
+        *classes: parameter classes.
+        fixed: why parameters can't be set later, by shell pattern; those that no pattern fits can be.
 
     Raises:
         ParameterError: on an unknown name, a wrong type or a value out of range.
@@ -69,24 +128,30 @@ def declare(node: Node, *classes: type, settable: tuple[type, ...] = ()) -> list
     objects: list[Any] = []
     for cls in classes:
         objects.append(from_mapping(cls, {n: v for n, v in values.items() if n in specs(cls)}, where=where))
-    writable = {name for cls in settable for name in specs(cls)}
+    node.fixed = reasons(known, fixed)
     for name, spec in known.items():
         default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
         override = values.get(name, default)
         node.declare_parameter(
             name,
             Parameter(name, _TYPES[spec.type], override).value,
-            _descriptor(spec, name not in writable),
+            _descriptor(spec, node.fixed.get(name, "")),
             ignore_override=True,
         )
     return objects
+
+
+def reasons(names: Iterable[str], fixed: Mapping[str, str]) -> dict[str, str]:
+    """Tell which of the parameters can't be set while a node runs, and why, by the first pattern that fits."""
+    found = {name: next((why for pattern, why in fixed.items() if fnmatchcase(name, pattern)), "") for name in names}
+    return {name: why for name, why in found.items() if why}
 
 
 def take_changes(node: Node, current: Any, take: Callable[[Any], None]) -> None:
     """Hand changed parameters to `take` as one checked object; what it or the check refuses is not set.
 
     Args:
-        node: where the parameters were declared as settable.
+        node: where the parameters were declared.
         current: the object that `declare` gave.
         take: may raise FormationError to refuse.
     """
@@ -106,19 +171,22 @@ def take_changes(node: Node, current: Any, take: Callable[[Any], None]) -> None:
 
 
 def _plain(spec: Spec, value: Any) -> Any:
-    """Undo what YAML and rcl make of numbers: 1 where 1.0 is meant, array('d') where a list is."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
+    """Undo what YAML and rcl make of values: 1 where 1.0 is meant, array('d') where a list is, nothing of [ ]."""
+    if value is None and isinstance(spec.default, tuple):
+        return []
+    value = _bare(value)
     if spec.type is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     return list(value) if isinstance(value, (list, tuple)) else value
 
 
-def _descriptor(spec: Spec, read_only: bool) -> ParameterDescriptor:
+def _descriptor(spec: Spec, fixed: str) -> ParameterDescriptor:
     unit = f" [{spec.unit}]" if spec.unit else ""
-    descriptor = ParameterDescriptor(description=spec.description + unit, read_only=read_only)
+    descriptor = ParameterDescriptor(description=spec.description + unit, read_only=bool(fixed))
+    constraints = [f"read-only: {fixed}"] if fixed else []
     if spec.choices:
-        descriptor.additional_constraints = "one of: " + ", ".join(map(str, spec.choices))
+        constraints.append("one of: " + ", ".join(map(str, spec.choices)))
+    descriptor.additional_constraints = "; ".join(constraints)
     low, high = spec.low, spec.high
     if low is not None or high is not None:
         if spec.type is int:

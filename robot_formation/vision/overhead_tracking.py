@@ -83,12 +83,18 @@ class OverheadTracker:
         self, parameters: OverheadTrackingParameters, surface: Surface, starts: Mapping[str, tuple[float, float]]
     ) -> None:
         """Begin with robots' starts: base_link's (x, y) in the world, metres, by name."""
-        self._parameters = parameters
-        self._locator = Locator(parameters.chosen(), surface, parameters.dot_height_m)
-        self._starts = {name: self._locator.place_of(x, y) for name, (x, y) in starts.items()}
+        self.configure(parameters, surface, starts)
         self.tracks: dict[str, DotTrack] = {}
         self.restarted = False
         self.restart()
+
+    def configure(
+        self, parameters: OverheadTrackingParameters, surface: Surface, starts: Mapping[str, tuple[float, float]]
+    ) -> None:
+        """Take other parameters for the same robots, from the next picture on; tracks go on."""
+        self._parameters = parameters
+        self._locator = Locator(parameters.chosen(), surface, parameters.dot_height_m)
+        self._starts = {name: self._locator.place_of(x, y) for name, (x, y) in starts.items()}
 
     def restart(self) -> None:
         """Expect all robots at their starts again."""

@@ -1,0 +1,166 @@
+"""`formation record`: topics of the ROS graph into a bag."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robot_formation.errors import FormationError
+
+if TYPE_CHECKING:
+    from robot_formation.nodes.recording import RecorderParameters, RecordReport
+
+DESCRIPTION = """\
+Record topics of the ROS graph (ROS_DOMAIN_ID and the like count) into an MCAP bag until Ctrl-C. Topics that appear
+later are recorded too. The folder is called DIR.partial until the bag is closed; 'formation recover' completes one
+whose recorder was killed.
+"""
+_MIB = 1 << 20
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("record", help="record topics into a bag", description=DESCRIPTION)
+    parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topic to record")
+    parser.add_argument("-a", "--all", action="store_true", help="record all topics")
+    parser.add_argument("-e", "--regex", metavar="R", default="", help="record topics that match as a whole")
+    parser.add_argument(
+        "-x", "--exclude", metavar="R", help="leave out topics that match as a whole (default: see docs)"
+    )
+    parser.add_argument("--no-images", action="store_true", help="leave pictures out, unless their topic is named")
+    parser.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder of the bag (default: a new one in bags/)")
+    parser.add_argument("--compression", choices=("zstd", "none"), default="zstd", help="of the chunks (default: zstd)")
+    parser.add_argument("--chunk-size", metavar="MIB", type=_positive, default=1.0, help="of a chunk (default: 1)")
+    parser.add_argument("--max-size", metavar="MIB", type=_positive, default=0.0, help="begin a new file after so much")
+    parser.add_argument(
+        "--max-duration", metavar="S", type=_positive, default=0.0, help="begin a new file after so long"
+    )
+    parser.add_argument(
+        "--queue-size",
+        metavar="MIB",
+        type=_positive,
+        default=64.0,
+        help="memory for what waits for the disk (default: 64)",
+    )
+    parser.add_argument(
+        "--time",
+        choices=("receive", "simulated"),
+        default="receive",
+        help="log times: the wall clock (default), or the messages' own stamps",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON and nothing else on standard output")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record until a signal; return 0.
+
+    Raises:
+        FormationError: nothing is asked for, a regular expression is none, the path is taken, or the disk is full.
+    """
+    if args.all == bool(args.topics or args.regex):
+        raise FormationError("say what to record: topics, --regex, or --all alone")
+    from robot_formation.bag.place import PathReservation, check_free
+    from robot_formation.bag.selection import Selection
+
+    Selection(args.topics, args.regex, args.exclude or "")  # a bad expression is told before ROS is loaded
+    path = (args.out or default_bag()).absolute()
+    with PathReservation(path):
+        check_free(path)
+        report = _record(args, path)
+    for text in _warnings(report):
+        print(f"warning: {text}", file=sys.stderr)
+    count = sum(report.message_counts.values())
+    if args.json:
+        print(json.dumps(_to_json(report), indent=2))
+    else:
+        print(f"{count} messages on {len(report.message_counts)} topics in {report.path}")
+    return 0
+
+
+def default_bag() -> Path:
+    """Name a new bag after the time."""
+    from robot_formation.paths import default_bags_dir
+
+    return default_bags_dir() / time.strftime("recording_%Y%m%d-%H%M%S")
+
+
+def _record(args: argparse.Namespace, path: Path) -> RecordReport:
+    from robot_formation.bag.provenance import git_commit, versions
+    from robot_formation.nodes.recording import RecorderNode
+    from robot_formation.nodes.session import Interrupts, node_session
+
+    texts = {"versions": json.dumps(versions()), "git_commit": git_commit()}
+    parameters = _parameters(args, path, tuple(f"{key}={text}" for key, text in texts.items()))
+    with Interrupts() as interrupts, node_session("recorder") as node:
+        recorder = RecorderNode(node, parameters, say=_say, warn=_warn, ask=True)
+        _say(f"recording into {path}; Ctrl-C ends")
+        return recorder.run(interrupts)
+
+
+def _parameters(args: argparse.Namespace, path: Path, metadata: tuple[str, ...]) -> RecorderParameters:
+    from robot_formation.nodes.recording import RecorderParameters
+    from robot_formation.parameters import from_mapping
+
+    values = {
+        "path": str(path),
+        "topics": args.topics,
+        "regex": args.regex,
+        "images": not args.no_images,
+        "time": args.time,
+        "compression": args.compression,
+        "chunk_bytes": round(args.chunk_size * _MIB),
+        "split_bytes": round(args.max_size * _MIB),
+        "split_s": args.max_duration,
+        "queue_bytes": round(args.queue_size * _MIB),
+        "metadata": metadata,
+    }
+    if args.exclude is not None:
+        values["exclude"] = args.exclude
+    return from_mapping(RecorderParameters, values, where="record")
+
+
+def _warnings(report: RecordReport) -> list[str]:
+    found = [f"nobody has published {topic}" for topic in report.unseen]
+    if not sum(report.message_counts.values()):
+        found.append("no message was recorded")
+    for text, counts in (
+        ("dropped: the disk is too slow for --queue-size", report.dropped),
+        ("lost on the way", report.lost),
+    ):
+        found += [f"{number} messages of {topic} {text}" for topic, number in counts.items()]
+    return found
+
+
+def _to_json(report: RecordReport) -> dict[str, Any]:
+    return {
+        "bag": str(report.path),
+        "messages": sum(report.message_counts.values()),
+        "topics": dict(report.message_counts),
+        "dropped": dict(report.dropped),
+        "lost": dict(report.lost),
+        "unseen": list(report.unseen),
+    }
+
+
+def _warn(text: str) -> None:
+    _say(f"warning: {text}")
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _positive(text: str) -> float:
+    """Convert for argparse, which turns the error into one line."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1e9:  # nor is NaN
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
+    return value
