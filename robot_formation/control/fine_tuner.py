@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from robot_formation.control.alignment import AlignmentParameters, Decision, PaperAlignment, Verdict
+from robot_formation.control.alignment import AlignmentParameters, Decision, Verdict
+from robot_formation.control.alignment_modes import AlignmentMode, PaperMode
+from robot_formation.control.alignment_precise import PreciseAlignment, PreciseParameters
 from robot_formation.control.motion import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
@@ -33,7 +35,7 @@ class LookParameters:
 class FineTunerParameters:
     """Parameters of the follower's fine-tuning controller."""
 
-    mode: str = parameter("paper", "How the camera's blocks are used", choices=("paper",))
+    mode: str = parameter("paper", "How the camera's blocks are used", choices=("paper", "precise"))
     first_step_m: float = parameter(
         0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
     )
@@ -44,6 +46,7 @@ class FineTunerParameters:
     )
     look: LookParameters = LookParameters()
     alignment: AlignmentParameters = AlignmentParameters()
+    precise: PreciseParameters = PreciseParameters()
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,7 @@ class Phase(Enum):
 
     NEIGHBOUR = auto()
     MOVE = auto()
+    SIGHT = auto()
     LOOK = auto()
     PREDICTION = auto()
     LOST = auto()
@@ -113,9 +117,10 @@ class FineTuner:
     def __init__(self, parameters: FineTunerParameters) -> None:
         self._p = parameters
         self._phase = Phase.NEIGHBOUR
-        self._alignment = PaperAlignment(parameters.alignment)
+        self._alignment = _mode(parameters)
         self._displacement = Motion()
         self._previous = Motion()
+        self._asked = Motion()
         self._prediction: Motion | None = None
         self._frames: list[Sequence[Block]] = []
         self._frames_wanted = 0
@@ -146,11 +151,12 @@ class FineTuner:
                 *self._look(),
             ]
         self._displacement = self._displacement.then(motion)
+        self._alignment.moved(self._asked, motion)
         return self._look()
 
     def frame(self, blocks: Sequence[Block], stamp_ns: int) -> list[Action]:
         """The camera's blocks of one frame. Only frames later than the last fact count."""
-        if self._phase is not Phase.LOOK or stamp_ns <= self._look_from_ns:
+        if self._phase not in (Phase.LOOK, Phase.SIGHT) or stamp_ns <= self._look_from_ns:
             return []
         self._frames.append(blocks)
         if len(self._frames) < self._frames_wanted:
@@ -160,7 +166,9 @@ class FineTuner:
             self._extensions += 1
             self._frames_wanted += self._p.look.extra_frames
             return [RequestFrames(self._p.look.extra_frames)]
-        return self._decide(self._alignment.assess(blocks), blocks)
+        if self._phase is Phase.SIGHT:
+            return self._go(self._alignment.turn_before(self._frames))
+        return self._decide(self._alignment.assess(self._frames))
 
     def prediction(self, mean: Motion | None) -> list[Action]:
         """The predictor's displacement for the next timestep, answered to this report; None if it has none."""
@@ -177,17 +185,22 @@ class FineTuner:
     def _begin(self) -> list[Action]:
         if self._neighbour < self.timestep:
             return []
-        self._alignment = PaperAlignment(self._p.alignment)
+        self._alignment.restart(self.timestep)
         self._displacement = Motion()
         if self.timestep == 0:
             return [State("align"), *self._look()]
+        return self._look(Phase.SIGHT) if self._alignment.looks_before else self._go(0.0)
+
+    def _go(self, turn_rad: float) -> list[Action]:
+        """Make the prediction move, and turn by what the look before it calls for."""
         self._phase = Phase.MOVE
         wish = self._planned()
         motion = Motion.from_uv(
             max(-self._p.max_u_m, min(self._p.max_u_m, wish.u_m)), max(-self._p.max_v_m, min(self._p.max_v_m, wish.v_m))
         )
         collecting = self.timestep <= COLLECTION_TIMESTEPS
-        actions: list[Action] = [State("collect" if collecting else "predict"), SendMove(motion)]
+        move = self._asked = Motion(motion.x_m, motion.y_m, turn_rad)
+        actions: list[Action] = [State("collect" if collecting else "predict"), SendMove(move)]
         if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
             actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"))
         return actions
@@ -199,8 +212,8 @@ class FineTuner:
             return self._previous
         return self._prediction
 
-    def _look(self) -> list[Action]:
-        self._phase = Phase.LOOK
+    def _look(self, phase: Phase = Phase.LOOK) -> list[Action]:
+        self._phase = phase
         self._frames = []
         self._frames_wanted = self._p.look.frames
         self._extensions = 0
@@ -212,7 +225,7 @@ class FineTuner:
         kinds = [sorted((block.signature, block.index) for block in blocks) for blocks in last]
         return all(kind == kinds[0] for kind in kinds)
 
-    def _decide(self, decision: Decision, blocks: Sequence[Block]) -> list[Action]:
+    def _decide(self, decision: Decision) -> list[Action]:
         if decision.verdict is Verdict.LOST:
             self._phase = Phase.LOST
             return [State("lost"), Lost()]
@@ -220,6 +233,7 @@ class FineTuner:
             return [State("hold"), *self._look()]
         if decision.verdict is Verdict.MOVE:
             self._phase = Phase.MOVE
+            self._asked = decision.motion
             return [State(f"correct: {decision.reason}"), SendMove(decision.motion)]
         actions: list[Action] = [State(decision.verdict.value)]
         if decision.verdict is Verdict.UNALIGNED:
@@ -228,10 +242,16 @@ class FineTuner:
             return [*actions, *self._finish()]
         self._phase = Phase.PREDICTION
         self._previous = Motion(self._displacement.x_m, self._displacement.y_m)
-        return [*actions, Report(self._displacement, self._alignment.offset(blocks))]
+        return [*actions, Report(self._displacement, self._alignment.offset())]
 
     def _finish(self) -> list[Action]:
         finished = self.timestep
         self.timestep += 1
         self._phase = Phase.NEIGHBOUR
         return [Done(finished), *self._begin()]
+
+
+def _mode(parameters: FineTunerParameters) -> AlignmentMode:
+    if parameters.mode == "paper":
+        return PaperMode(parameters.alignment)
+    return PreciseAlignment(parameters.precise, parameters.first_step_m)

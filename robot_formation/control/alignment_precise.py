@@ -1,0 +1,159 @@
+"""`mode: precise`: corrections from an estimate of the neighbour's pose, which lasts over all looks and moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robot_formation.control.alignment import TARGET, Decision, Verdict
+from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, legs, way_to
+from robot_formation.control.marker_view import EdgeParameters, mean_boxes
+from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.control.pose_filter import FilterParameters, PoseFilter
+from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y
+from robot_formation.parameters import parameter
+from robot_formation.vision.block import Block
+
+_LEAST_DRIVE_M = 0.02
+_SLIP_GAIN = 0.3
+
+
+@dataclass(frozen=True)
+class PreciseParameters:
+    """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
+
+    u_tolerance_m: float = parameter(0.007, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
+    v_tolerance_m: float = parameter(0.007, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    heading_tolerance_rad: float = parameter(
+        math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
+    )
+    turn_rad: float = parameter(
+        math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
+    )
+    certain_rad: float = parameter(
+        math.radians(1.2), "Standard deviation of the heading that ends the first alignment", unit="rad", low=1e-3, high=1.0
+    )
+    placed_heading_rad: float = parameter(
+        math.radians(1.0),
+        "Standard deviation of the heading of a follower that was placed in formation by hand",
+        unit="rad",
+        low=1e-4,
+        high=1.0,
+    )
+    placed_m: float = parameter(
+        0.02, "Offset up to which a follower counts as placed in formation", unit="m", low=0.0, high=0.2
+    )
+    averaged_frames: int = parameter(10, "Last frames of a look that are averaged", low=1, high=600)
+    max_moves: int = parameter(14, "Corrections per timestep; v, u and turn count apart", low=1, high=1000)
+    geometry: GeometryParameters = GeometryParameters()
+    edges: EdgeParameters = EdgeParameters()
+    filter: FilterParameters = FilterParameters()
+    approach: ApproachParameters = ApproachParameters()
+
+
+class PreciseAlignment:
+    """Keeps the estimate over the timesteps; one decision a look."""
+
+    looks_before = True
+
+    def __init__(self, parameters: PreciseParameters, first_step_m: float) -> None:
+        self._p = parameters
+        self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
+        self._approach = Approach(parameters.approach)
+        self._neighbour_step = Motion(x_m=first_step_m)
+        self._moves = 0
+        self._timestep = 0
+        self._sides = 0
+        self._slip = 0.0
+
+    def restart(self, timestep: int) -> None:
+        """Begin a timestep: the neighbour has made its step."""
+        self._moves = 0
+        self._timestep = timestep
+        if timestep > 0:
+            step = self._neighbour_step
+            self._filter.neighbour_stepped(Motion(step.x_m, self._slip * step.x_m))
+
+    def turn_before(self, frames: Sequence[Sequence[Block]]) -> float:
+        """Look before the prediction move; returns the turn [rad] that goes with it."""
+        boxes = self._boxes(frames)
+        if TARGET in boxes and self._filter.known:
+            self._filter.look(boxes)
+        if not self._filter.known:
+            return 0.0
+        heading = way_to(self._filter.best.state, FORMATION).yaw_rad
+        return heading if abs(heading) > self._p.turn_rad else 0.0
+
+    def moved(self, asked: Motion, motion: Motion) -> None:
+        """Take a measured move, and learn from it how far a drive ahead slips aside."""
+        self._filter.moved(motion)
+        if asked.x_m > _LEAST_DRIVE_M and motion.x_m > _LEAST_DRIVE_M:
+            slip = (motion.y_m - asked.y_m) / motion.x_m
+            self._slip += _SLIP_GAIN * (slip - self._slip)
+
+    def offset(self) -> Motion | None:
+        """Estimate the way to the formation position in the follower's frame."""
+        return way_to(self._filter.best.state, FORMATION) if self._filter.known else None
+
+    def assess(self, frames: Sequence[Sequence[Block]]) -> Decision:
+        """Decide what the last look calls for."""
+        boxes = self._boxes(frames)
+        if not boxes:
+            return Decision(Verdict.LOOK, reason="no block in view")
+        first = not self._filter.known
+        self._filter.look(boxes)
+        state = self._filter.best.state
+        way = way_to(state, FORMATION)
+        if first and set(boxes) == {TARGET} and self._placed(state):
+            self._filter.assume_heading(self._p.placed_heading_rad)
+            way = way_to(self._filter.best.state, FORMATION)
+        goal, reason = FORMATION, "to the formation position"
+        unsure = self._filter.yaw_sigma_rad > self._p.certain_rad
+        if unsure and self._timestep == 0 and self._moves < self._p.max_moves - 5:
+            goal, reason = self._vantage(state), "to where the marker shows two faces"
+        elif self._within(way):
+            return Decision(Verdict.ALIGNED, reason="inside the tolerances")
+        motion = self._without_trifles(self._approach.next(state, goal)) if goal is not FORMATION else self._last_way(way)
+        if self._moves + legs(motion) > self._p.max_moves:
+            return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
+        if motion == Motion():
+            return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
+        self._moves += legs(motion)
+        return Decision(Verdict.MOVE, motion, reason)
+
+    def _last_way(self, way: Motion) -> Motion:
+        return self._without_trifles(self._approach.next(self._filter.best.state, FORMATION))
+
+    def _boxes(self, frames: Sequence[Sequence[Block]]) -> dict[int, object]:
+        return mean_boxes(frames[-self._p.averaged_frames :])
+
+    def _placed(self, state: Vector) -> bool:
+        return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m
+
+    def _within(self, way: Motion) -> bool:
+        p = self._p
+        return (
+            abs(way.y_m) <= p.u_tolerance_m
+            and abs(way.x_m) <= p.v_tolerance_m
+            and abs(way.yaw_rad) <= p.heading_tolerance_rad
+        )
+
+    def _without_trifles(self, motion: Motion) -> Motion:
+        """Leave out legs that are hardly worth a move."""
+        p = self._p
+        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        x, y = c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m
+        yaw = motion.yaw_rad if abs(motion.yaw_rad) > 0.4 * p.heading_tolerance_rad else 0.0
+        x = x if abs(x) > 0.5 * p.v_tolerance_m else 0.0
+        y = y if abs(y) > 0.5 * p.u_tolerance_m else 0.0
+        c, s = math.cos(yaw), math.sin(yaw)
+        return Motion(c * x - s * y, s * x + c * y, yaw)
+
+    def _vantage(self, state: object) -> Motion:
+        """A place beside and behind, or ahead, from where a second face shows; the side changes with each look."""
+        self._sides += 1
+        x = float(-way_to(state, Motion()).x_m)  # type: ignore[arg-type]
+        side = -1.0 if x < 0.0 else 1.0
+        reach = (0.14, 0.10, 0.12)[self._sides % 3]
+        return Motion(side * reach, -0.33, 0.0)
