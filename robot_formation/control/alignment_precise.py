@@ -17,6 +17,11 @@ from robot_formation.vision.block import Block
 
 _LEAST_DRIVE_M = 0.02
 _SLIP_GAIN = 0.3
+_LEAST_LEG_M = 0.0022
+_LONGEST_BESIDE_M = 0.01
+_SHORT_DRIVE_M = 0.06
+_MOST_SHORT_M = 0.006
+_SHORT_GAIN = 0.5
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,7 @@ class PreciseParameters:
     """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
 
     u_tolerance_m: float = parameter(0.007, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
-    v_tolerance_m: float = parameter(0.007, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    v_tolerance_m: float = parameter(0.006, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
     heading_tolerance_rad: float = parameter(
         math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
     )
@@ -66,6 +71,8 @@ class PreciseAlignment:
         self._timestep = 0
         self._sides = 0
         self._slip = 0.0
+        self._wanted: Motion | None = None
+        self._short: dict[tuple[str, bool], float] = {}
 
     def restart(self, timestep: int) -> None:
         """Begin a timestep: the neighbour has made its step."""
@@ -88,9 +95,37 @@ class PreciseAlignment:
     def moved(self, asked: Motion, motion: Motion) -> None:
         """Take a measured move, and learn from it how far a drive ahead slips aside."""
         self._filter.moved(motion)
+        self._wanted = self._learn(asked, motion)
         if asked.x_m > _LEAST_DRIVE_M and motion.x_m > _LEAST_DRIVE_M:
-            slip = (motion.y_m - asked.y_m) / motion.x_m
-            self._slip += _SLIP_GAIN * (slip - self._slip)
+            # A leg shorter than the robot's coasting is not driven at all.
+            driven = asked.y_m if abs(asked.y_m) > _LEAST_LEG_M else 0.0
+            if abs(driven) < _LONGEST_BESIDE_M:
+                self._slip += _SLIP_GAIN * ((motion.y_m - driven) / motion.x_m - self._slip)
+
+    def _learn(self, asked: Motion, motion: Motion) -> Motion | None:
+        """Learn from a correction what the drive falls short by on each axis and in each direction."""
+        wanted = self._wanted
+        if wanted is None:
+            return None
+        c, s = math.cos(asked.yaw_rad), math.sin(asked.yaw_rad)
+        for axis, want, got, sent in (
+            ("v", c * wanted.x_m + s * wanted.y_m, c * motion.x_m + s * motion.y_m, c * asked.x_m + s * asked.y_m),
+            ("u", c * wanted.y_m - s * wanted.x_m, c * motion.y_m - s * motion.x_m, c * asked.y_m - s * asked.x_m),
+        ):
+            if want and abs(want) < _SHORT_DRIVE_M:
+                key = (axis, want > 0.0)
+                missing = (sent - got) * math.copysign(1.0, want)
+                known = self._short.get(key, 0.0)
+                self._short[key] = max(0.0, min(_MOST_SHORT_M, known + _SHORT_GAIN * (missing - known)))
+        return None
+
+    def _compensated(self, motion: Motion) -> Motion:
+        """Ask for as much more as the drive has lately fallen short by."""
+        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        x, y = c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m
+        x += math.copysign(self._short.get(("v", x > 0.0), 0.0), x) if 0.0 < abs(x) < _SHORT_DRIVE_M else 0.0
+        y += math.copysign(self._short.get(("u", y > 0.0), 0.0), y) if 0.0 < abs(y) < _SHORT_DRIVE_M else 0.0
+        return Motion(c * x - s * y, s * x + c * y, motion.yaw_rad)
 
     def offset(self) -> Motion | None:
         """Estimate the way to the formation position in the follower's frame."""
@@ -114,16 +149,14 @@ class PreciseAlignment:
             goal, reason = self._vantage(state), "to where the marker shows two faces"
         elif self._within(way):
             return Decision(Verdict.ALIGNED, reason="inside the tolerances")
-        motion = self._without_trifles(self._approach.next(state, goal)) if goal is not FORMATION else self._last_way(way)
+        motion = self._without_trifles(self._approach.next(self._filter.likely(), goal))
         if self._moves + legs(motion) > self._p.max_moves:
             return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
         self._moves += legs(motion)
-        return Decision(Verdict.MOVE, motion, reason)
-
-    def _last_way(self, way: Motion) -> Motion:
-        return self._without_trifles(self._approach.next(self._filter.best.state, FORMATION))
+        self._wanted = motion
+        return Decision(Verdict.MOVE, self._compensated(motion), reason)
 
     def _boxes(self, frames: Sequence[Sequence[Block]]) -> dict[int, object]:
         return mean_boxes(frames[-self._p.averaged_frames :])

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +21,8 @@ _HIDDEN_COST_M = 0.25
 _DETOUR_COST_M = 0.3
 _TURN_COST_M_PER_RAD = 0.15
 _PATH_POINTS = 5
+_ROUNDING_M = 1e-6
+_COMPENSATION_M = 0.008
 
 
 @dataclass(frozen=True)
@@ -45,19 +48,20 @@ class Approach:
         self._half = half
         self._signs = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])
 
-    def next(self, state: Vector, goal: Motion) -> Motion:
-        """Choose the next motion towards a goal.
+    def next(self, states: Sequence[Vector], goal: Motion) -> Motion:
+        """Choose the next motion towards a goal; no motion if there is none that keeps clear.
 
         Args:
-            state: the neighbour's state (5,) as in `relative_pose`.
+            states: where the neighbour may stand, as in `relative_pose`, the likeliest first; each must be kept clear.
             goal: place and heading to get to, in the neighbour's frame.
         """
+        state = states[0]
         way = way_to(state, goal)
-        if self._direct(way) and self._clear(state, way):
+        if self._direct(way) and all(self._clear(other, way) for other in states):
             return way
         best, least = Motion(), math.inf
         for motion in self._candidates(way):
-            if not self._clear(state, motion):
+            if not all(self._clear(other, motion) for other in states):
                 continue
             cost = self._cost(after_motion(state, motion), goal) + _LEG_COST_M * legs(motion)
             if cost < least:
@@ -71,11 +75,11 @@ class Approach:
     def _direct(self, way: Motion) -> bool:
         c, s = math.cos(way.yaw_rad), math.sin(way.yaw_rad)
         forward, left = c * way.x_m + s * way.y_m, c * way.y_m - s * way.x_m
-        p = self._p
-        return abs(forward) <= p.max_v_m and abs(left) <= p.max_u_m and abs(way.yaw_rad) <= p.max_turn_rad
+        p, spare = self._p, _COMPENSATION_M
+        return abs(forward) <= p.max_v_m - spare and abs(left) <= p.max_u_m - spare and abs(way.yaw_rad) <= p.max_turn_rad
 
     def _candidates(self, way: Motion) -> list[Motion]:
-        p = self._p
+        p = replace(self._p, max_v_m=self._p.max_v_m - _ROUNDING_M, max_u_m=self._p.max_u_m - _ROUNDING_M)
         turn = _clip(way.yaw_rad, p.max_turn_rad)
         found = []
         for yaw in dict.fromkeys((turn, 0.0, 0.5 * turn, -0.35, 0.35)):

@@ -32,6 +32,7 @@ from robot_formation.parameters import parameter
 
 _ITERATIONS = 6
 _KEPT_COST = 16.0
+_LIKELY_COST = 6.0
 _HYPOTHESES = 8
 _FACES = (TARGET, FRONT, REAR)
 
@@ -66,7 +67,7 @@ class FilterParameters:
         0.0007, "How far the neighbour's step leads aside from its heading", unit="m", low=0.0, high=1.0
     )
     slip_per_lean: float = parameter(
-        1.2,
+        1.0,
         "Sideways slip of a driving robot: share of its way per radian of lateral slope",
         unit="1/rad",
         low=0.0,
@@ -114,6 +115,10 @@ class PoseFilter:
         inside = np.array([h.covariance[YAW, YAW] for h in self.hypotheses])
         mean = float(weights @ yaws)
         return math.sqrt(float(weights @ (inside + (yaws - mean) ** 2)))
+
+    def likely(self) -> list[Vector]:
+        """List the states that looks have not yet ruled out, the likeliest first."""
+        return [h.state for h in self.hypotheses if h.cost <= self.best.cost + _LIKELY_COST]
 
     def forget(self) -> None:
         """Drop everything."""
