@@ -15,6 +15,11 @@ from robot_formation.control.relative_pose import GeometryParameters, MarkerMode
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
+_VANTAGES_M = (0.14, 0.11, -0.11, -0.14, -0.125, 0.125, 0.15, -0.15)
+_VANTAGE_BESIDE_M = 0.33
+_LAST_MOVES = 5
+_CLUELESS_RAD = 0.08
+_ASIDE_RAD = 0.25
 _LEAST_DRIVE_M = 0.02
 _SLIP_GAIN = 0.3
 _LEAST_LEG_M = 0.0022
@@ -37,7 +42,7 @@ class PreciseParameters:
         math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
     )
     certain_rad: float = parameter(
-        math.radians(1.2), "Standard deviation of the heading that ends the first alignment", unit="rad", low=1e-3, high=1.0
+        math.radians(0.5), "Standard deviation of the heading that ends the first alignment", unit="rad", low=1e-3, high=1.0
     )
     placed_heading_rad: float = parameter(
         math.radians(1.0),
@@ -50,7 +55,7 @@ class PreciseParameters:
         0.02, "Offset up to which a follower counts as placed in formation", unit="m", low=0.0, high=0.2
     )
     averaged_frames: int = parameter(10, "Last frames of a look that are averaged", low=1, high=600)
-    max_moves: int = parameter(14, "Corrections per timestep; v, u and turn count apart", low=1, high=1000)
+    max_moves: int = parameter(14, "Corrections per timestep after which the follower goes on unaligned", low=1, high=1000)
     geometry: GeometryParameters = GeometryParameters()
     edges: EdgeParameters = EdgeParameters()
     filter: FilterParameters = FilterParameters()
@@ -69,7 +74,7 @@ class PreciseAlignment:
         self._neighbour_step = Motion(x_m=first_step_m)
         self._moves = 0
         self._timestep = 0
-        self._sides = 0
+        self._vantages: list[float] = []
         self._slip = 0.0
         self._wanted: Motion | None = None
         self._short: dict[tuple[str, bool], float] = {}
@@ -143,20 +148,27 @@ class PreciseAlignment:
         if first and set(boxes) == {TARGET} and self._placed(state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             way = way_to(self._filter.best.state, FORMATION)
-        goal, reason = FORMATION, "to the formation position"
         unsure = self._filter.yaw_sigma_rad > self._p.certain_rad
-        if unsure and self._timestep == 0 and self._moves < self._p.max_moves - 5:
-            goal, reason = self._vantage(state), "to where the marker shows two faces"
-        elif self._within(way):
+        searching = unsure and self._timestep == 0 and self._moves < self._p.max_moves - _LAST_MOVES
+        if not searching and self._within(way):
             return Decision(Verdict.ALIGNED, reason="inside the tolerances")
-        motion = self._without_trifles(self._approach.next(self._filter.likely(), goal))
-        if self._moves + legs(motion) > self._p.max_moves:
+        if self._moves >= self._p.max_moves:
             return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
+        motion, reason = self._next(state, searching)
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
-        self._moves += legs(motion)
+        self._moves += 1
         self._wanted = motion
         return Decision(Verdict.MOVE, self._compensated(motion), reason)
+
+    def _next(self, state: Vector, searching: bool) -> tuple[Motion, str]:
+        """Choose the next motion and say why."""
+        states = self._filter.likely()
+        if self._filter.yaw_sigma_rad > _CLUELESS_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
+            return self._approach.face(states), "turn towards the marker"
+        if searching:
+            return self._without_trifles(self._approach.next(states, self._vantage(state))), "to see two faces"
+        return self._without_trifles(self._approach.next(states, FORMATION)), "to the formation position"
 
     def _boxes(self, frames: Sequence[Sequence[Block]]) -> dict[int, object]:
         return mean_boxes(frames[-self._p.averaged_frames :])
@@ -183,10 +195,13 @@ class PreciseAlignment:
         c, s = math.cos(yaw), math.sin(yaw)
         return Motion(c * x - s * y, s * x + c * y, yaw)
 
-    def _vantage(self, state: object) -> Motion:
-        """A place beside and behind, or ahead, from where a second face shows; the side changes with each look."""
-        self._sides += 1
-        x = float(-way_to(state, Motion()).x_m)  # type: ignore[arg-type]
-        side = -1.0 if x < 0.0 else 1.0
-        reach = (0.14, 0.10, 0.12)[self._sides % 3]
-        return Motion(side * reach, -0.33, 0.0)
+    def _vantage(self, state: Vector) -> Motion:
+        """A place behind or ahead from where a second face shows: twice on the near side, then on the other.
+
+        The outer edges of Front and Rear are biased alike, so that the two sides' errors in heading cancel.
+        """
+        if not self._vantages:
+            behind = way_to(state, Motion()).x_m > 0.0
+            self._vantages = [-place if behind else place for place in _VANTAGES_M]
+        place = self._vantages.pop(0)
+        return Motion(place, -_VANTAGE_BESIDE_M, 0.0)

@@ -61,12 +61,21 @@ class Approach:
             return way
         best, least = Motion(), math.inf
         for motion in self._candidates(way):
-            if not all(self._clear(other, motion) for other in states):
+            if not legs(motion) or not all(self._clear(other, motion) for other in states):
                 continue
             cost = self._cost(after_motion(state, motion), goal) + _LEG_COST_M * legs(motion)
             if cost < least:
                 best, least = motion, cost
         return best
+
+    def face(self, states: Sequence[Vector]) -> Motion:
+        """Turn towards the neighbour, as far as the bodies keep clear wherever it may stand; else step back a little."""
+        bearing = -math.atan2(states[0][X], states[0][Y])
+        turns = [Motion(yaw_rad=share * _clip(bearing, self._p.max_turn_rad)) for share in (1.0, 0.6, 0.3)]
+        for motion in [*turns, Motion(y_m=-0.08), Motion(y_m=-0.04)]:
+            if all(self._clear(state, motion) for state in states):
+                return motion
+        return Motion()
 
     def apart(self, state: Vector) -> bool:
         """Whether the bodies keep their distance."""

@@ -10,6 +10,7 @@ from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
 PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX = 316.0, 208.0
+_CUT = 6.0
 _MARGIN_PX = 5.0
 """An edge nearer to the picture's border may be the border's, not the marker's."""
 
@@ -25,24 +26,35 @@ class EdgeParameters:
     target_top_px: float = parameter(1.6, "Bias of its upper edge", unit="px", low=-20.0, high=20.0)
     target_bottom_px: float = parameter(-1.1, "Bias of its lower edge", unit="px", low=-20.0, high=20.0)
     front_left_px: float = parameter(2.4, "Bias of the Front block's left edge", unit="px", low=-20.0, high=20.0)
-    front_right_px: float = parameter(-1.3, "Bias of its right edge", unit="px", low=-20.0, high=20.0)
-    rear_left_px: float = parameter(3.2, "Bias of the Rear block's left edge", unit="px", low=-20.0, high=20.0)
+    front_right_px: float = parameter(-0.5, "Bias of its right edge", unit="px", low=-20.0, high=20.0)
+    narrow_right_px: float = parameter(
+        -1.9, "Bias of the right edge of a narrow Front block", unit="px", low=-20.0, high=20.0
+    )
+    narrow_px: float = parameter(10.0, "Reported width below which a block is narrow", unit="px", low=0.0, high=100.0)
+    rear_left_px: float = parameter(3.3, "Bias of the Rear block's left edge", unit="px", low=-20.0, high=20.0)
     rear_right_px: float = parameter(
         0.1, "Bias of its right edge where no Target block follows", unit="px", low=-20.0, high=20.0
     )
     column_sigma_px: float = parameter(0.7, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
     far_column_sigma_px: float = parameter(
-        1.4, "Scatter of the outer edges of Front and Rear", unit="px", low=0.01, high=20.0
+        1.3, "Scatter of the outer edges of Front and Rear", unit="px", low=0.01, high=20.0
     )
     row_sigma_px: float = parameter(0.45, "Scatter of upper and lower edges", unit="px", low=0.01, high=20.0)
-    least_width_px: float = parameter(
-        7.0, "Width from which on a face should have been reported", unit="px", low=1.0, high=100.0
+    front_shows_px: float = parameter(
+        9.0, "Width from which on the Front face is always reported", unit="px", low=1.0, high=100.0
     )
+    rear_shows_px: float = parameter(
+        15.0, "Width from which on the Rear face is always reported", unit="px", low=1.0, high=100.0
+    )
+    hidden_sigma_px: float = parameter(1.5, "How sharp these bounds are", unit="px", low=0.01, high=20.0)
 
 
 @dataclass(frozen=True)
 class Edge:
-    """One measured edge: face (signature), side, position [px] and its standard deviation [px]."""
+    """One measured edge: face (signature), side, position [px] and its standard deviation [px].
+
+    The side "width" means a face that isn't reported: it can't be wider than this.
+    """
 
     face: int
     side: str
@@ -91,7 +103,9 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
         edges += _rows(TARGET, target, p, 1.0)
     if front is not None:
         edges.append(Edge(FRONT, "left", front.left - p.front_left_px, near))
-        edges.append(Edge(FRONT, "right", front.right - p.front_right_px, far))
+        narrow = front.width < p.narrow_px
+        bias = p.narrow_right_px if narrow else p.front_right_px
+        edges.append(Edge(FRONT, "right", front.right - bias, 1.5 * far if narrow else far))
         edges += _rows(FRONT, front, p, 2.0) if target is None else []
     if rear is not None:
         edges.append(Edge(REAR, "left", rear.left - p.rear_left_px, far))
@@ -101,8 +115,17 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
     return View(tuple(edge for edge in edges if _inside(edge)), frozenset(boxes))
 
 
+def hidden(view: View, p: EdgeParameters) -> Iterable[Edge]:
+    """List bounds on the widths of faces that the look does not report."""
+    for face, width in ((FRONT, p.front_shows_px), (REAR, p.rear_shows_px), (TARGET, p.front_shows_px)):
+        if face not in view.faces:
+            yield Edge(face, "width", width, p.hidden_sigma_px)
+
+
 def _rows(face: int, box: Box, p: EdgeParameters, scale: float) -> Iterable[Edge]:
-    sigma = scale * p.row_sigma_px
+    # Of a face that the picture cuts off, the hidden part may reach higher.
+    cut = box.left < _MARGIN_PX or box.right > PICTURE_WIDTH_PX - 1.0 - _MARGIN_PX
+    sigma = scale * p.row_sigma_px * (_CUT if cut else 1.0)
     return (
         Edge(face, "top", box.top - p.target_top_px, sigma),
         Edge(face, "bottom", box.bottom - p.target_bottom_px, sigma),

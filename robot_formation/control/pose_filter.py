@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
-from robot_formation.control.marker_view import Edge, EdgeParameters, View, view
+from robot_formation.control.alignment import TARGET, Box
+from robot_formation.control.marker_view import Edge, EdgeParameters, PICTURE_WIDTH_PX, View, hidden, view
 from robot_formation.control.motion import Motion
 from robot_formation.control.relative_pose import (
     CURVATURE,
@@ -32,9 +32,8 @@ from robot_formation.parameters import parameter
 
 _ITERATIONS = 6
 _KEPT_COST = 16.0
-_LIKELY_COST = 6.0
-_HYPOTHESES = 8
-_FACES = (TARGET, FRONT, REAR)
+_LIKELY_COST = 16.0
+_HYPOTHESES = 14
 
 
 @dataclass(frozen=True)
@@ -190,6 +189,8 @@ class PoseFilter:
         for hypothesis in self.hypotheses:
             self._update(hypothesis, seen)
         self._prune()
+        if not self.hypotheses:
+            self._begin(boxes)
 
     def surprise(self, boxes: dict[int, Box]) -> float:
         """Tell how badly a look fits: squared innovation by its expected scatter, per edge."""
@@ -220,7 +221,7 @@ class PoseFilter:
 
     def _update(self, hypothesis: Hypothesis, seen: View) -> None:
         """Iterated extended Kalman update; the cost is that of the posterior's residuals and of the way to it."""
-        edges = list(seen.edges) + self._unseen(hypothesis.state, seen)
+        edges = [*seen.edges, *self._exceeded(hypothesis.state, seen)]
         if not edges:
             return
         measured = np.array([edge.position_px for edge in edges])
@@ -245,31 +246,40 @@ class PoseFilter:
         hypothesis.cost += float(np.linalg.slogdet(scatter)[1])
         hypothesis.cost += self._contradiction(state, seen)
 
-    def _unseen(self, state: Vector, seen: View) -> list[Edge]:
-        return []
+    def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
+        """List the bounds on faces that were not reported which a state breaks."""
+        widths, columns = self._model.widths(state), self._model.pixels(state[None])[0, :, 0]
+        if columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX:
+            return []  # it may be beyond the picture's edge
+        return [edge for edge in hidden(seen, self._edges) if widths[edge.face] > edge.position_px]
 
     def _contradiction(self, state: Vector, seen: View) -> float:
-        """Charge faces that should have been reported and were not, or the other way round."""
+        """Charge faces that were reported and should not have been, or the other way round."""
         widths = self._model.widths(state)
-        low = self._edges.least_width_px
-        cost = 0.0
-        for face in _FACES:
-            wrong = 1.0 - widths[face] if face in seen.faces else widths[face] - 1.5 * low
-            cost += max(0.0, wrong) ** 2 / 4.0
+        cost = sum(max(0.0, 1.0 - widths[face]) ** 2 / 4.0 for face in seen.faces)
+        for edge in self._exceeded(state, seen):
+            cost += ((widths[edge.face] - edge.position_px) / edge.sigma_px) ** 2
         return cost
 
     def _prune(self) -> None:
         """Keep the likely hypotheses, one of each kind, the best first."""
         kept: list[Hypothesis] = []
+        self.hypotheses = [h for h in self.hypotheses if math.isfinite(h.cost) and _sane(h)]
         for hypothesis in sorted(self.hypotheses, key=lambda h: h.cost):
-            if not np.isfinite(hypothesis.state).all() or hypothesis.cost > self._least() + _KEPT_COST:
+            if hypothesis.cost > self._least() + _KEPT_COST:
                 continue
             if all(abs(hypothesis.state[YAW] - other.state[YAW]) > math.radians(3.0) for other in kept):
                 kept.append(hypothesis)
         self.hypotheses = kept[:_HYPOTHESES]
 
     def _least(self) -> float:
-        return min(h.cost for h in self.hypotheses if np.isfinite(h.state).all())
+        return min(h.cost for h in self.hypotheses)
+
+
+def _sane(hypothesis: Hypothesis) -> bool:
+    """Whether a hypothesis is about a neighbour that could be in view."""
+    state = hypothesis.state
+    return bool(np.isfinite(state).all()) and math.hypot(state[X], state[Y]) < 2.0 and abs(state[YAW]) < 2.0
 
 
 def _gain_update(hypothesis: Hypothesis, h: Matrix, innovation: Vector, variance: Vector) -> float:

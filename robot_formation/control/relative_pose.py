@@ -87,6 +87,10 @@ class MarkerModel:
         pixels = self.pixels(states)
         found = np.empty((len(states), len(edges)))
         for number, edge in enumerate(edges):
+            if edge.side == "width":
+                right, left = (pixels[:, _CORNERS[edge.face, side], 0].mean(axis=1) for side in ("right", "left"))
+                found[:, number] = right - left
+                continue
             axis = 0 if edge.side in ("left", "right") else 1
             values = pixels[:, _CORNERS[edge.face, edge.side], axis]
             found[:, number] = values.min(axis=1) if edge.side in ("left", "top") else values.max(axis=1)
