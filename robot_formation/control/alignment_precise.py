@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robot_formation.control.alignment import TARGET, Decision, Verdict
-from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, legs, way_to
+from robot_formation.control.alignment import TARGET, Box, Decision, Verdict
+from robot_formation.control.alignment_modes import Frames
+from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, way_to
+from robot_formation.control.drive_experience import DriveExperience
+from robot_formation.control.leader_search import LeaderSearch, SearchParameters
 from robot_formation.control.marker_view import EdgeParameters, mean_boxes
 from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 from robot_formation.control.pose_filter import FilterParameters, PoseFilter
 from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y
 from robot_formation.parameters import parameter
-from robot_formation.vision.block import Block
 
+_SURPRISE = 12.0
+"""Mean square of a look's innovations by their scatter from which on something is in the way."""
 _VANTAGES_M = (0.14, 0.11, -0.11, -0.14, -0.125, 0.125, 0.15, -0.15)
 _VANTAGE_BESIDE_M = 0.33
 _LAST_MOVES = 5
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
-_LEAST_DRIVE_M = 0.02
-_SLIP_GAIN = 0.3
-_LEAST_LEG_M = 0.0022
-_LONGEST_BESIDE_M = 0.01
-_SHORT_DRIVE_M = 0.06
-_MOST_SHORT_M = 0.006
-_SHORT_GAIN = 0.5
 
 
 @dataclass(frozen=True)
@@ -42,7 +38,11 @@ class PreciseParameters:
         math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
     )
     certain_rad: float = parameter(
-        math.radians(0.5), "Standard deviation of the heading that ends the first alignment", unit="rad", low=1e-3, high=1.0
+        math.radians(0.6),
+        "Standard deviation of the heading that ends the first alignment",
+        unit="rad",
+        low=1e-3,
+        high=1.0,
     )
     placed_heading_rad: float = parameter(
         math.radians(1.0),
@@ -55,11 +55,14 @@ class PreciseParameters:
         0.02, "Offset up to which a follower counts as placed in formation", unit="m", low=0.0, high=0.2
     )
     averaged_frames: int = parameter(10, "Last frames of a look that are averaged", low=1, high=600)
-    max_moves: int = parameter(14, "Corrections per timestep after which the follower goes on unaligned", low=1, high=1000)
+    max_moves: int = parameter(
+        14, "Corrections per timestep after which the follower goes on unaligned", low=1, high=1000
+    )
     geometry: GeometryParameters = GeometryParameters()
     edges: EdgeParameters = EdgeParameters()
     filter: FilterParameters = FilterParameters()
     approach: ApproachParameters = ApproachParameters()
+    search: SearchParameters = SearchParameters()
 
 
 class PreciseAlignment:
@@ -71,95 +74,71 @@ class PreciseAlignment:
         self._p = parameters
         self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
         self._approach = Approach(parameters.approach)
-        self._neighbour_step = Motion(x_m=first_step_m)
+        self._experience = DriveExperience()
+        self._search = LeaderSearch(parameters.search)
+        self._step_m = first_step_m
         self._moves = 0
         self._timestep = 0
+        self._last = Motion()
         self._vantages: list[float] = []
-        self._slip = 0.0
-        self._wanted: Motion | None = None
-        self._short: dict[tuple[str, bool], float] = {}
 
     def restart(self, timestep: int) -> None:
         """Begin a timestep: the neighbour has made its step."""
         self._moves = 0
         self._timestep = timestep
+        self._last = Motion()
         if timestep > 0:
-            step = self._neighbour_step
-            self._filter.neighbour_stepped(Motion(step.x_m, self._slip * step.x_m))
+            self._filter.neighbour_stepped(Motion(self._step_m, self._experience.slip * self._step_m))
 
-    def turn_before(self, frames: Sequence[Sequence[Block]]) -> float:
+    def turn_before(self, frames: Frames) -> float:
         """Look before the prediction move; returns the turn [rad] that goes with it."""
         boxes = self._boxes(frames)
-        if TARGET in boxes and self._filter.known:
-            self._filter.look(boxes)
         if not self._filter.known:
             return 0.0
+        if TARGET in boxes and self._filter.surprise(boxes) < _SURPRISE:
+            self._filter.look(boxes)
         heading = way_to(self._filter.best.state, FORMATION).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
 
     def moved(self, asked: Motion, motion: Motion) -> None:
-        """Take a measured move, and learn from it how far a drive ahead slips aside."""
+        """Take a measured move."""
         self._filter.moved(motion)
-        self._wanted = self._learn(asked, motion)
-        if asked.x_m > _LEAST_DRIVE_M and motion.x_m > _LEAST_DRIVE_M:
-            # A leg shorter than the robot's coasting is not driven at all.
-            driven = asked.y_m if abs(asked.y_m) > _LEAST_LEG_M else 0.0
-            if abs(driven) < _LONGEST_BESIDE_M:
-                self._slip += _SLIP_GAIN * ((motion.y_m - driven) / motion.x_m - self._slip)
-
-    def _learn(self, asked: Motion, motion: Motion) -> Motion | None:
-        """Learn from a correction what the drive falls short by on each axis and in each direction."""
-        wanted = self._wanted
-        if wanted is None:
-            return None
-        c, s = math.cos(asked.yaw_rad), math.sin(asked.yaw_rad)
-        for axis, want, got, sent in (
-            ("v", c * wanted.x_m + s * wanted.y_m, c * motion.x_m + s * motion.y_m, c * asked.x_m + s * asked.y_m),
-            ("u", c * wanted.y_m - s * wanted.x_m, c * motion.y_m - s * motion.x_m, c * asked.y_m - s * asked.x_m),
-        ):
-            if want and abs(want) < _SHORT_DRIVE_M:
-                key = (axis, want > 0.0)
-                missing = (sent - got) * math.copysign(1.0, want)
-                known = self._short.get(key, 0.0)
-                self._short[key] = max(0.0, min(_MOST_SHORT_M, known + _SHORT_GAIN * (missing - known)))
-        return None
-
-    def _compensated(self, motion: Motion) -> Motion:
-        """Ask for as much more as the drive has lately fallen short by."""
-        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-        x, y = c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m
-        x += math.copysign(self._short.get(("v", x > 0.0), 0.0), x) if 0.0 < abs(x) < _SHORT_DRIVE_M else 0.0
-        y += math.copysign(self._short.get(("u", y > 0.0), 0.0), y) if 0.0 < abs(y) < _SHORT_DRIVE_M else 0.0
-        return Motion(c * x - s * y, s * x + c * y, motion.yaw_rad)
+        self._experience.moved(asked, motion)
+        self._last = motion
 
     def offset(self) -> Motion | None:
         """Estimate the way to the formation position in the follower's frame."""
         return way_to(self._filter.best.state, FORMATION) if self._filter.known else None
 
-    def assess(self, frames: Sequence[Sequence[Block]]) -> Decision:
+    def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
         boxes = self._boxes(frames)
-        if not boxes:
-            return Decision(Verdict.LOOK, reason="no block in view")
+        if boxes and self._search.looks >= self._p.search.hold_looks:
+            # What doesn't fit for so long is not in the way: the neighbour, or the follower, was moved.
+            if self._filter.known and self._filter.surprise(boxes) >= _SURPRISE:
+                self._filter.forget()
+        if not boxes or (self._filter.known and self._filter.surprise(boxes) >= _SURPRISE):
+            return self._search.missed(self._last if self._moves else Motion(), self.offset())
+        self._search.found()
         first = not self._filter.known
         self._filter.look(boxes)
-        state = self._filter.best.state
-        way = way_to(state, FORMATION)
-        if first and set(boxes) == {TARGET} and self._placed(state):
+        if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
-            way = way_to(self._filter.best.state, FORMATION)
-        unsure = self._filter.yaw_sigma_rad > self._p.certain_rad
-        searching = unsure and self._timestep == 0 and self._moves < self._p.max_moves - _LAST_MOVES
-        if not searching and self._within(way):
+        return self._correct()
+
+    def _correct(self) -> Decision:
+        p, state = self._p, self._filter.best.state
+        unsure = self._filter.yaw_sigma_rad > p.certain_rad
+        searching = unsure and self._timestep == 0 and self._moves < p.max_moves - _LAST_MOVES
+        if not searching and self._within(way_to(state, FORMATION)):
             return Decision(Verdict.ALIGNED, reason="inside the tolerances")
-        if self._moves >= self._p.max_moves:
+        if self._moves >= p.max_moves:
             return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
         motion, reason = self._next(state, searching)
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
         self._moves += 1
-        self._wanted = motion
-        return Decision(Verdict.MOVE, self._compensated(motion), reason)
+        return Decision(Verdict.MOVE, self._experience.compensated(motion), reason)
 
     def _next(self, state: Vector, searching: bool) -> tuple[Motion, str]:
         """Choose the next motion and say why."""
@@ -170,8 +149,9 @@ class PreciseAlignment:
             return self._without_trifles(self._approach.next(states, self._vantage(state))), "to see two faces"
         return self._without_trifles(self._approach.next(states, FORMATION)), "to the formation position"
 
-    def _boxes(self, frames: Sequence[Sequence[Block]]) -> dict[int, object]:
-        return mean_boxes(frames[-self._p.averaged_frames :])
+    def _boxes(self, frames: Frames) -> dict[int, Box]:
+        last = frames[-self._p.averaged_frames :]
+        return mean_boxes([self._filter.plausible(blocks) for blocks in last] if self._filter.known else last)
 
     def _placed(self, state: Vector) -> bool:
         return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m

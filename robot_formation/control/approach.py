@@ -85,7 +85,9 @@ class Approach:
         c, s = math.cos(way.yaw_rad), math.sin(way.yaw_rad)
         forward, left = c * way.x_m + s * way.y_m, c * way.y_m - s * way.x_m
         p, spare = self._p, _COMPENSATION_M
-        return abs(forward) <= p.max_v_m - spare and abs(left) <= p.max_u_m - spare and abs(way.yaw_rad) <= p.max_turn_rad
+        return (
+            abs(forward) <= p.max_v_m - spare and abs(left) <= p.max_u_m - spare and abs(way.yaw_rad) <= p.max_turn_rad
+        )
 
     def _candidates(self, way: Motion) -> list[Motion]:
         p = replace(self._p, max_v_m=self._p.max_v_m - _ROUNDING_M, max_u_m=self._p.max_u_m - _ROUNDING_M)

@@ -28,6 +28,9 @@ class LookParameters:
     frames: int = parameter(22, "Frames of a look: block filtering 40 shows a new block in frame 21", low=1, high=600)
     stable_frames: int = parameter(3, "Last frames that must report the same blocks", low=1, high=600)
     extra_frames: int = parameter(10, "Frames asked for when the blocks are not stable", low=1, high=600)
+    max_requests: int = parameter(
+        3, "Requests for frames that don't come before the camera counts as dead", low=0, high=100
+    )
     max_extensions: int = parameter(3, "Extensions of a look before its last frame is taken as it is", low=0, high=100)
 
 
@@ -121,6 +124,8 @@ class FineTuner:
         self._displacement = Motion()
         self._previous = Motion()
         self._asked = Motion()
+        self._out_of_view = False
+        self._resent = 0
         self._prediction: Motion | None = None
         self._frames: list[Sequence[Block]] = []
         self._frames_wanted = 0
@@ -158,6 +163,7 @@ class FineTuner:
         """The camera's blocks of one frame. Only frames later than the last fact count."""
         if self._phase not in (Phase.LOOK, Phase.SIGHT) or stamp_ns <= self._look_from_ns:
             return []
+        self._resent = 0
         self._frames.append(blocks)
         if len(self._frames) < self._frames_wanted:
             return []
@@ -169,6 +175,17 @@ class FineTuner:
         if self._phase is Phase.SIGHT:
             return self._go(self._alignment.turn_before(self._frames))
         return self._decide(self._alignment.assess(self._frames))
+
+    def stalled(self) -> list[Action]:
+        """Nothing comes any more: ask again for frames that are missing; a camera that stays silent loses the leader."""
+        if self._phase not in (Phase.LOOK, Phase.SIGHT):
+            return []
+        self._resent += 1
+        if self._resent > self._p.look.max_requests:
+            self._phase = Phase.LOST
+            return [State("lost"), Warn("the camera gives no frames any more"), Lost()]
+        missing = self._frames_wanted - len(self._frames)
+        return [Warn(f"{missing} frames of a look are missing: asked for again"), RequestFrames(missing)]
 
     def prediction(self, mean: Motion | None) -> list[Action]:
         """The predictor's displacement for the next timestep, answered to this report; None if it has none."""
@@ -193,14 +210,13 @@ class FineTuner:
 
     def _go(self, turn_rad: float) -> list[Action]:
         """Make the prediction move, and turn by what the look before it calls for."""
-        self._phase = Phase.MOVE
         wish = self._planned()
         motion = Motion.from_uv(
             max(-self._p.max_u_m, min(self._p.max_u_m, wish.u_m)), max(-self._p.max_v_m, min(self._p.max_v_m, wish.v_m))
         )
         collecting = self.timestep <= COLLECTION_TIMESTEPS
-        move = self._asked = Motion(motion.x_m, motion.y_m, turn_rad)
-        actions: list[Action] = [State("collect" if collecting else "predict"), SendMove(move)]
+        move = Motion(motion.x_m, motion.y_m, turn_rad)
+        actions: list[Action] = [State("collect" if collecting else "predict"), *self._move(move)]
         if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
             actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"))
         return actions
@@ -230,12 +246,16 @@ class FineTuner:
             self._phase = Phase.LOST
             return [State("lost"), Lost()]
         if decision.verdict is Verdict.LOOK:
+            self._out_of_view = True
             return [State("hold"), *self._look()]
+        if decision.verdict is Verdict.SEARCH:
+            self._out_of_view = True
+            return [State(f"search: {decision.reason}"), *self._move(decision.motion)]
+        actions: list[Action] = [State("reacquired")] if self._out_of_view else []
+        self._out_of_view = False
         if decision.verdict is Verdict.MOVE:
-            self._phase = Phase.MOVE
-            self._asked = decision.motion
-            return [State(f"correct: {decision.reason}"), SendMove(decision.motion)]
-        actions: list[Action] = [State(decision.verdict.value)]
+            return [*actions, State(f"correct: {decision.reason}"), *self._move(decision.motion)]
+        actions.append(State(decision.verdict.value))
         if decision.verdict is Verdict.UNALIGNED:
             actions.append(Warn(decision.reason))
         if self.timestep == 0:
@@ -243,6 +263,11 @@ class FineTuner:
         self._phase = Phase.PREDICTION
         self._previous = Motion(self._displacement.x_m, self._displacement.y_m)
         return [*actions, Report(self._displacement, self._alignment.offset())]
+
+    def _move(self, motion: Motion) -> list[Action]:
+        self._phase = Phase.MOVE
+        self._asked = motion
+        return [SendMove(motion)]
 
     def _finish(self) -> list[Action]:
         finished = self.timestep

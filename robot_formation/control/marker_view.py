@@ -23,15 +23,15 @@ class EdgeParameters:
     target_right_px: float = parameter(
         0.1, "Bias of its right edge where no Front block follows", unit="px", low=-20.0, high=20.0
     )
-    target_top_px: float = parameter(1.6, "Bias of its upper edge", unit="px", low=-20.0, high=20.0)
-    target_bottom_px: float = parameter(-1.1, "Bias of its lower edge", unit="px", low=-20.0, high=20.0)
-    front_left_px: float = parameter(2.4, "Bias of the Front block's left edge", unit="px", low=-20.0, high=20.0)
+    target_top_px: float = parameter(1.4, "Bias of its upper edge", unit="px", low=-20.0, high=20.0)
+    target_bottom_px: float = parameter(-1.3, "Bias of its lower edge", unit="px", low=-20.0, high=20.0)
+    front_left_px: float = parameter(2.3, "Bias of the Front block's left edge", unit="px", low=-20.0, high=20.0)
     front_right_px: float = parameter(-0.5, "Bias of its right edge", unit="px", low=-20.0, high=20.0)
     narrow_right_px: float = parameter(
-        -1.9, "Bias of the right edge of a narrow Front block", unit="px", low=-20.0, high=20.0
+        -2.7, "Bias of the right edge of a narrow Front block", unit="px", low=-20.0, high=20.0
     )
     narrow_px: float = parameter(10.0, "Reported width below which a block is narrow", unit="px", low=0.0, high=100.0)
-    rear_left_px: float = parameter(3.3, "Bias of the Rear block's left edge", unit="px", low=-20.0, high=20.0)
+    rear_left_px: float = parameter(3.05, "Bias of the Rear block's left edge", unit="px", low=-20.0, high=20.0)
     rear_right_px: float = parameter(
         0.1, "Bias of its right edge where no Target block follows", unit="px", low=-20.0, high=20.0
     )
@@ -97,7 +97,9 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
     near, far = p.column_sigma_px, p.far_column_sigma_px
     target, front, rear = boxes.get(TARGET), boxes.get(FRONT), boxes.get(REAR)
     if target is not None:
-        edges.append(Edge(TARGET, "left", target.left - p.target_left_px, near))
+        # The detector begins a row's earlier segments one cell late.
+        late, sigma = (0.5, 1.6 * near) if front is not None else (0.0, near)
+        edges.append(Edge(TARGET, "left", target.left - p.target_left_px - late, sigma))
         if front is None:
             edges.append(Edge(TARGET, "right", target.right - p.target_right_px, near))
         edges += _rows(TARGET, target, p, 1.0)

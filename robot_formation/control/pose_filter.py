@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_formation.control.alignment import TARGET, Box
+from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
 from robot_formation.control.marker_view import Edge, EdgeParameters, PICTURE_WIDTH_PX, View, hidden, view
 from robot_formation.control.motion import Motion
 from robot_formation.control.relative_pose import (
@@ -29,11 +29,14 @@ from robot_formation.control.relative_pose import (
     after_motion,
 )
 from robot_formation.parameters import parameter
+from robot_formation.vision.block import Block
 
 _ITERATIONS = 6
 _KEPT_COST = 16.0
 _LIKELY_COST = 16.0
+_GATE_PX = 15.0
 _HYPOTHESES = 14
+FACES = (TARGET, FRONT, REAR)
 
 
 @dataclass(frozen=True)
@@ -191,6 +194,25 @@ class PoseFilter:
         self._prune()
         if not self.hypotheses:
             self._begin(boxes)
+
+    def plausible(self, blocks: Sequence[Block]) -> list[Block]:
+        """Leave out blocks that lie where no hypothesis expects their face: distractors of the same colour."""
+        kept = []
+        for block in blocks:
+            if any(self._expects(hypothesis, block) for hypothesis in self.hypotheses):
+                kept.append(block)
+        return kept
+
+    def _expects(self, hypothesis: Hypothesis, block: Block) -> bool:
+        if block.signature not in FACES:
+            return False
+        corners = self._model.pixels(hypothesis.state[None])[0]
+        spread = 3.0 * math.sqrt(float(np.trace(hypothesis.covariance[:2, :2]))) + 0.5 * math.sqrt(
+            float(hypothesis.covariance[YAW, YAW])
+        )
+        gate = _GATE_PX + self._model.parameters.focal_length_px * spread / max(0.1, float(hypothesis.state[Y]))
+        low, high = corners.min(axis=0) - gate, corners.max(axis=0) + gate
+        return bool(low[0] <= block.x <= high[0] and low[1] <= block.y <= high[1])
 
     def surprise(self, boxes: dict[int, Box]) -> float:
         """Tell how badly a look fits: squared innovation by its expected scatter, per edge."""

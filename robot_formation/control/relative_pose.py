@@ -127,9 +127,7 @@ def after_motion(state: Vector, motion: Motion) -> Vector:
     """Tell the state after the follower's motion."""
     c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
     dx, dy = state[X] - motion.x_m, state[Y] - motion.y_m
-    return np.array(
-        [c * dx + s * dy, c * dy - s * dx, state[YAW] - motion.yaw_rad, state[CURVATURE], state[TWIST]]
-    )
+    return np.array([c * dx + s * dy, c * dy - s * dx, state[YAW] - motion.yaw_rad, state[CURVATURE], state[TWIST]])
 
 
 def way_to_formation(state: Vector) -> Motion:
