@@ -113,11 +113,12 @@ class PreciseAlignment:
     def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
         boxes = self._boxes(frames)
-        if boxes and self._search.looks >= self._p.search.hold_looks:
+        strange = self._filter.known and self._filter.surprise(boxes) >= _SURPRISE
+        if strange and self._search.looks >= self._p.search.hold_looks:
             # What doesn't fit for so long is not in the way: the neighbour, or the follower, was moved.
-            if self._filter.known and self._filter.surprise(boxes) >= _SURPRISE:
-                self._filter.forget()
-        if not boxes or (self._filter.known and self._filter.surprise(boxes) >= _SURPRISE):
+            self._filter.forget()
+            strange = False
+        if not boxes or strange:
             return self._search.missed(self._last if self._moves else Motion(), self.offset())
         self._search.found()
         first = not self._filter.known

@@ -69,7 +69,7 @@ class Approach:
         return best
 
     def face(self, states: Sequence[Vector]) -> Motion:
-        """Turn towards the neighbour, as far as the bodies keep clear wherever it may stand; else step back a little."""
+        """Turn towards the neighbour, as far as that keeps clear wherever it may stand; else step away a little."""
         bearing = -math.atan2(states[0][X], states[0][Y])
         turns = [Motion(yaw_rad=share * _clip(bearing, self._p.max_turn_rad)) for share in (1.0, 0.6, 0.3)]
         for motion in [*turns, Motion(y_m=-0.08), Motion(y_m=-0.04)]:
@@ -137,7 +137,7 @@ class Approach:
             own = abs(axis[0]) * self._half[0] + abs(axis[1]) * self._half[1]
             other = abs(axis @ (c, s)) * self._half[0] + abs(axis @ (-s, c)) * self._half[1]
             gaps.append(abs(float(axis @ place)) - own - other)
-        return max(gaps)
+        return float(max(gaps))
 
 
 def way_to(state: Vector, goal: Motion) -> Motion:

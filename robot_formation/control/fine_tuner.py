@@ -177,7 +177,7 @@ class FineTuner:
         return self._decide(self._alignment.assess(self._frames))
 
     def stalled(self) -> list[Action]:
-        """Nothing comes any more: ask again for frames that are missing; a camera that stays silent loses the leader."""
+        """Nothing comes any more: ask again for missing frames; a camera that stays silent loses the leader."""
         if self._phase not in (Phase.LOOK, Phase.SIGHT):
             return []
         self._resent += 1

@@ -23,8 +23,8 @@ class EdgeParameters:
     target_right_px: float = parameter(
         0.1, "Bias of its right edge where no Front block follows", unit="px", low=-20.0, high=20.0
     )
-    target_top_px: float = parameter(1.4, "Bias of its upper edge", unit="px", low=-20.0, high=20.0)
-    target_bottom_px: float = parameter(-1.3, "Bias of its lower edge", unit="px", low=-20.0, high=20.0)
+    target_top_px: float = parameter(1.25, "Bias of its upper edge", unit="px", low=-20.0, high=20.0)
+    target_bottom_px: float = parameter(-1.15, "Bias of its lower edge", unit="px", low=-20.0, high=20.0)
     front_left_px: float = parameter(2.3, "Bias of the Front block's left edge", unit="px", low=-20.0, high=20.0)
     front_right_px: float = parameter(-0.5, "Bias of its right edge", unit="px", low=-20.0, high=20.0)
     narrow_right_px: float = parameter(
@@ -38,6 +38,13 @@ class EdgeParameters:
     column_sigma_px: float = parameter(0.7, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
     far_column_sigma_px: float = parameter(
         1.3, "Scatter of the outer edges of Front and Rear", unit="px", low=0.01, high=20.0
+    )
+    sliver_sigma_px: float = parameter(
+        2.5,
+        "Scatter of the Target block's right edge beside a Front face too narrow to be reported",
+        unit="px",
+        low=0.01,
+        high=50.0,
     )
     row_sigma_px: float = parameter(0.45, "Scatter of upper and lower edges", unit="px", low=0.01, high=20.0)
     front_shows_px: float = parameter(

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
-from robot_formation.control.marker_view import Edge, EdgeParameters, PICTURE_WIDTH_PX, View, hidden, view
+from robot_formation.control.marker_view import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, view
 from robot_formation.control.motion import Motion
 from robot_formation.control.relative_pose import (
     CURVATURE,
@@ -243,7 +243,7 @@ class PoseFilter:
 
     def _update(self, hypothesis: Hypothesis, seen: View) -> None:
         """Iterated extended Kalman update; the cost is that of the posterior's residuals and of the way to it."""
-        edges = [*seen.edges, *self._exceeded(hypothesis.state, seen)]
+        edges = [*self._trusted(hypothesis.state, seen), *self._exceeded(hypothesis.state, seen)]
         if not edges:
             return
         measured = np.array([edge.position_px for edge in edges])
@@ -267,6 +267,15 @@ class PoseFilter:
         hypothesis.cost += float(residual @ (residual / np.diag(noise)) + way @ np.linalg.solve(covariance, way))
         hypothesis.cost += float(np.linalg.slogdet(scatter)[1])
         hypothesis.cost += self._contradiction(state, seen)
+
+    def _trusted(self, state: Vector, seen: View) -> list[Edge]:
+        """List the edges; a sliver of the Front face may shift the Target block's right one."""
+        sliver = FRONT not in seen.faces and self._model.widths(state)[FRONT] > 0.0
+        sigma = self._edges.sliver_sigma_px
+        return [
+            replace(edge, sigma_px=sigma) if sliver and (edge.face, edge.side) == (TARGET, "right") else edge
+            for edge in seen.edges
+        ]
 
     def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
         """List the bounds on faces that were not reported which a state breaks."""

@@ -53,6 +53,13 @@ class GeometryParameters:
     centre_y_px: float = parameter(103.5, "Row of the optical axis", unit="px", low=0.0, high=1e4)
     lens_y_m: float = parameter(-0.038, "Lens in base_link", unit="m", low=-1.0, high=1.0)
     lens_z_m: float = parameter(0.126, "Lens in base_link", unit="m", low=0.0, high=2.0)
+    row_inset_px: float = parameter(
+        7.0,
+        "Columns that a slanting edge must leave in a row for the detector to report it",
+        unit="px",
+        low=0.0,
+        high=50.0,
+    )
     marker_edge_m: float = parameter(0.06, "Edge of the marker's cube", unit="m", low=0.005, high=1.0)
     marker_top_m: float = parameter(0.216, "Height of the marker's top", unit="m", low=0.01, high=2.0)
 
@@ -91,10 +98,21 @@ class MarkerModel:
                 right, left = (pixels[:, _CORNERS[edge.face, side], 0].mean(axis=1) for side in ("right", "left"))
                 found[:, number] = right - left
                 continue
-            axis = 0 if edge.side in ("left", "right") else 1
-            values = pixels[:, _CORNERS[edge.face, edge.side], axis]
-            found[:, number] = values.min(axis=1) if edge.side in ("left", "top") else values.max(axis=1)
+            columns, rows = np.moveaxis(pixels[:, _CORNERS[edge.face, edge.side]], -1, 0)
+            if edge.side == "left":
+                found[:, number] = columns.min(axis=1)
+            elif edge.side == "right":
+                found[:, number] = columns.max(axis=1)
+            else:
+                found[:, number] = self._row(columns, rows, edge.side == "top")
         return found
+
+    def _row(self, columns: Matrix, rows: Matrix, top: bool) -> Vector:
+        """Upper or lower end of a face: where its slanting edge leaves enough columns for the detector."""
+        end = rows.min(axis=1) if top else rows.max(axis=1)
+        other = rows.max(axis=1) if top else rows.min(axis=1)
+        width = np.abs(columns[:, 1] - columns[:, 0])
+        return np.asarray(end + (other - end) * np.minimum(1.0, self.parameters.row_inset_px / np.maximum(width, 1.0)))
 
     def widths(self, state: Vector) -> dict[int, float]:
         """Tell how wide each face appears, px; negative if it is turned away."""

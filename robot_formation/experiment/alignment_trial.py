@@ -39,7 +39,8 @@ _PUSHED_M = 5e-4
 @dataclass(frozen=True)
 class Start:
     """Where a follower stands relative to its neighbour: u to the right and v ahead in its frame [m], angle clockwise
-    from its heading [deg]."""
+    from its heading [deg].
+    """
 
     u_m: float
     v_m: float
