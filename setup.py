@@ -33,6 +33,7 @@ setup(
     python_requires=">=3.10",
     install_requires=[
         "PyYAML",
+        "joblib",
         "matplotlib",
         "mcap",
         "numpy",
@@ -44,10 +45,14 @@ setup(
     extras_require={
         # ROS 2 Jazzy where none is installed. Not among the requirements: a ROS install brings its own.
         "pip": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
+        # Sweeps on many machines.
+        "dask": ["dask[distributed]"],
         "test": [
             "colcon-common-extensions",
             "hypothesis",
             "mypy",
+            "odmd",
+            "pykoop",
             "pytest",
             "pytest-xdist",
             "ruff",

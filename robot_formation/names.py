@@ -149,6 +149,7 @@ BLOCKS = Topic("blocks", "sensor_msgs/msg/PointCloud2", listeners=("fine_tuner",
 BLOCKS_IMAGE = Topic("blocks/image", IMAGE_TYPE)
 DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
 RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
+COMMANDED = Topic("commanded", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
 PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("fine_tuner",))
 ALIGNMENT = Topic("alignment", "std_msgs/msg/String", HISTORY)
 # Only in bags, where the recorder makes them of ground truth and robot descriptions: tf2_msgs is not on pip.

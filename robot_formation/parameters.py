@@ -61,18 +61,26 @@ def parameter(
     return dataclasses.field(default=default, metadata=metadata)
 
 
-def specs(cls: type, prefix: str = "") -> dict[str, Spec]:
-    """List the parameters of a dataclass by dotted name, nested dataclasses included."""
+def specs(cls: type, prefix: str = "", *, defaults: Any = None) -> dict[str, Spec]:
+    """List the parameters of a dataclass by dotted name, nested dataclasses included.
+
+    Args:
+        cls: the dataclass.
+        prefix: put before every name.
+        defaults: an instance of it, if its values and not the class's are the defaults.
+    """
     found: dict[str, Spec] = {}
     hints = typing.get_type_hints(cls)
     for field in dataclasses.fields(cls):
         kind = hints[field.name]
         name = prefix + field.name
         if dataclasses.is_dataclass(kind):
-            found.update(specs(typing.cast(type, kind), name + "."))
+            inner = field.default if defaults is None else getattr(defaults, field.name)
+            inner = None if inner is dataclasses.MISSING else inner
+            found.update(specs(typing.cast(type, kind), name + ".", defaults=inner))
             continue
         meta = field.metadata
-        default = field.default
+        default = field.default if defaults is None else getattr(defaults, field.name)
         found[name] = Spec(
             name, kind, default, meta["unit"], meta["low"], meta["high"], tuple(meta["choices"]), meta["description"]
         )
@@ -175,14 +183,18 @@ def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
     return value
 
 
-def _build(cls: type[T], flat: Mapping[str, Any], prefix: str = "") -> T:
+def _build(cls: type[T], flat: Mapping[str, Any], prefix: str = "", defaults: Any = None) -> T:
     hints = typing.get_type_hints(cls)
     arguments: dict[str, Any] = {}
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         kind = hints[field.name]
         name = prefix + field.name
         if dataclasses.is_dataclass(kind):
-            arguments[field.name] = _build(typing.cast(type, kind), flat, name + ".")
+            inner = field.default if defaults is None else getattr(defaults, field.name)
+            inner = None if inner is dataclasses.MISSING else inner
+            arguments[field.name] = _build(typing.cast(type, kind), flat, name + ".", inner)
         elif name in flat:
             arguments[field.name] = flat[name]
+        elif defaults is not None:
+            arguments[field.name] = getattr(defaults, field.name)
     return cls(**arguments)

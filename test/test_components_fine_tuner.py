@@ -56,10 +56,12 @@ def test_timesteps_0_and_1_on_messages(wire):
     assert message.header.frame_id == BASE
     assert plain(wire.give("moved", planar(Motion(0.049, -0.002), 20))) == [("camera/request", 1)]
     sent = wire.give("blocks", blocks(IN_PLACE, 30))
-    assert [topic for topic, _ in sent] == ["alignment", "displacement", "residual"]
-    displacement, residual = sent[1][1], sent[2][1]
-    assert conversions.stamp_of(displacement) == conversions.stamp_of(residual) == 30
-    assert displacement.header.frame_id == residual.header.frame_id == BASE
+    assert [topic for topic, _ in sent] == ["alignment", "commanded", "displacement", "residual"]
+    commanded, displacement, residual = (message for _, message in sent[1:])
+    assert {conversions.stamp_of(message) for _, message in sent[1:]} == {30}
+    assert {message.header.frame_id for _, message in sent[1:]} == {BASE}
+    assert conversions.read_displacement(commanded) == Motion(0.05)
+    assert conversions.has_estimate(commanded)
     assert conversions.read_displacement(displacement) == Motion(0.049, -0.002)
     expected = PaperAlignment(AlignmentParameters()).offset(IN_PLACE)
     assert conversions.read_displacement(residual) == expected
@@ -99,7 +101,7 @@ def test_bad_blocks_warn_and_do_not_count_as_a_frame(wire):
     assert wire.give("blocks", bad) == []
     assert "cut off" in wire.warnings[0]
     assert wire.component.details()["waiting for"] == "look"
-    assert len(wire.give("blocks", blocks(IN_PLACE, 31))) == 3
+    assert len(wire.give("blocks", blocks(IN_PLACE, 31))) == 4
 
 
 def test_a_moved_that_is_not_finite_warns_and_stays_out_of_the_displacement(wire):
@@ -110,6 +112,7 @@ def test_a_moved_that_is_not_finite_warns_and_stays_out_of_the_displacement(wire
     assert "not finite" in wire.warnings[0]
     sent = dict(wire.give("blocks", blocks(IN_PLACE, 30)))
     assert conversions.read_displacement(sent["displacement"]) == Motion()
+    assert not conversions.has_estimate(sent["commanded"])
 
 
 @pytest.mark.parametrize(

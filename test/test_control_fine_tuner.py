@@ -198,7 +198,61 @@ def test_without_the_target_face_the_residual_is_unknown():
     script.moved(Motion(0.05))
     script.look(only_front)
     script.moved(Motion(-0.05))
-    assert script.look(only_front)[-1] == Report(Motion(0.05).then(Motion(-0.05)), None)
+    assert script.look(only_front)[-1] == Report(Motion(0.05).then(Motion(-0.05)), None, Motion(0.0))
+
+
+def test_commanded_is_the_displacement_without_what_the_prediction_move_missed():
+    script = after_collection()  # with the prediction (4, 4) cm
+    script.tick(4)
+    script.moved(Motion.from_uv(0.037, 0.043))
+    script.look(TOO_FAR_BACK)
+    script.moved(Motion.from_uv(0.001, 0.011))  # a correction: what it misses is none of the command's
+    (_, report) = script.look(IN_PLACE)
+    assert (report.displacement.u_m, report.displacement.v_m) == pytest.approx((0.038, 0.054))
+    assert (report.commanded.u_m, report.commanded.v_m) == pytest.approx((0.041, 0.051))
+
+
+def test_commanded_is_of_the_move_that_was_sent_when_the_prediction_was_cut():
+    script = after_collection()
+    script.timestep(4, Motion(0.05), Motion.from_uv(0.15, 0.05))
+    script.tick(5)
+    script.moved(Motion.from_uv(0.048, 0.05))
+    (_, report) = script.look(IN_PLACE)
+    assert (report.commanded.u_m, report.commanded.v_m) == pytest.approx((0.05, 0.05))
+
+
+def test_commanded_is_known_in_the_collection_phase_and_starts_anew_in_each_timestep():
+    script = Script()
+    script.tick(0)
+    script.look(IN_PLACE)
+    wish = Motion(0.05)
+    for number in (1, 2, 3):
+        script.tick(number)
+        realised = Motion.from_uv(0.002 * number, 0.05)
+        script.moved(realised)
+        (_, report) = script.look(IN_PLACE)
+        assert (report.commanded.x_m, report.commanded.y_m) == pytest.approx((wish.x_m, wish.y_m))
+        wish = realised
+        script.prediction(Motion(0.05))
+
+
+def test_commanded_is_unknown_where_the_prediction_moves_end_is_but_not_where_a_corrections_is():
+    script = Script()
+    script.tick(0)
+    script.look(IN_PLACE)
+    script.tick(1)
+    script.moved(Motion(math.nan))
+    script.look(TOO_FAR_BACK)
+    script.moved(Motion(0.01))
+    (_, report) = script.look(IN_PLACE)
+    assert report.commanded is None
+    script.prediction(Motion(0.05))
+    script.tick(2)
+    script.moved(Motion(0.012))
+    script.look(TOO_FAR_BACK)
+    script.moved(Motion(math.nan))
+    (_, report) = script.look(IN_PLACE)
+    assert report.commanded == Motion(0.01)
 
 
 def test_only_frames_stamped_after_the_last_fact_count():

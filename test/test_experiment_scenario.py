@@ -20,7 +20,7 @@ from robot_formation.experiment.scenario import (
     track_names,
     with_surface,
 )
-from robot_formation.koopman.predictors import MODELS, PredictorParameters
+from robot_formation.koopman.predictors import NAMES, PredictorParameters
 from robot_formation.parameters import from_mapping, specs, to_mapping
 from robot_formation.surface import SURFACES
 
@@ -223,9 +223,9 @@ def test_another_surface_comes_with_its_own_defaults(track_two, surface):
 
 
 def test_every_predictor_can_be_chosen(track_two):
-    for name in MODELS:
+    for name in NAMES:
         assert override(track_two, [f"predictor.name={name}"]).parameters("predictor")["name"] == name
-    assert set(specs(PredictorParameters)["name"].choices) == set(MODELS)
+    assert set(specs(PredictorParameters)["name"].choices) == set(NAMES)
 
 
 # --- what can be wrong ------------------------------------------------------------------------------------------------

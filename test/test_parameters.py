@@ -192,3 +192,28 @@ def test_nested_parameters_are_dataclasses_all_the_way():
         cls = kind.parameter_class()
         assert is_dataclass(cls)
         assert all(field.metadata or is_dataclass(field.default) for field in fields(cls))
+
+
+def test_a_nested_dataclass_keeps_the_defaults_that_its_owner_gives_it():
+    @dataclass(frozen=True)
+    class Inner:
+        a: float = parameter(1.0, "a")
+        b: float = parameter(2.0, "b")
+
+    @dataclass(frozen=True)
+    class Middle:
+        inner: Inner = Inner(a=5.0)
+
+    @dataclass(frozen=True)
+    class Outer:
+        plain: Inner = Inner()
+        own: Inner = Inner(a=3.0)
+        middle: Middle = Middle(inner=Inner(b=7.0))
+
+    globals().update(Inner=Inner, Middle=Middle)  # annotations are resolved by name
+    try:
+        assert {name: spec.default for name, spec in specs(Outer).items()} == to_mapping(Outer())
+        assert from_mapping(Outer, {"own.b": 4.0}, where="test") == Outer(own=Inner(a=3.0, b=4.0))
+        assert from_mapping(Outer, {"middle.inner.a": 9.0}, where="test").middle.inner == Inner(a=9.0, b=7.0)
+    finally:
+        del globals()["Inner"], globals()["Middle"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,16 @@ from typing import Any
 import numpy as np
 
 from robot_formation import names
+from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
 from robot_formation.bag.reader import Bag, read_bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.control.motion import Motion
+from robot_formation.parameters import suggestion
 
 _TRIANGLE_LIST = 11
+_LOGGED = (names.DISPLACEMENT, names.RESIDUAL, names.COMMANDED)
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
 
 
@@ -42,11 +45,23 @@ def run_record(bag: Bag) -> RunRecord:
         AnalysisError: the bag has no run of a formation.
     """
     robots = _robots(bag)
-    wanted = _topics(robots)
+    wanted = run_topics(robots)
     bag.require({topic: type_name for topic, type_name in wanted.items() if topic in bag.topics})
     messages: dict[str, list[Any]] = defaultdict(list)
     for message in bag.messages(wanted):
         messages[message.topic].append(message.message)
+    return record_of(robots, messages, bag.metadata(METADATA_NAME))
+
+
+def record_of(robots: Sequence[str], messages: Mapping[str, Sequence[Any]], details: Mapping[str, str]) -> RunRecord:
+    """Put a run's record together from its messages by absolute topic, in order; whoever read them, rosbags or ROS.
+
+    Args:
+        robots: the leader, then the followers by number.
+        messages: those of the topics that `run_topics` names; topics without messages may be absent.
+        details: what the run says of itself.
+    """
+    messages = defaultdict(list, messages)
     markers = messages[_absolute(names.SURFACE.name)]
     tracks = {robot: _track(messages[_absolute(names.ground_truth_odom(robot).name)]) for robot in robots}
     record = RunRecord(
@@ -54,14 +69,49 @@ def run_record(bag: Bag) -> RunRecord:
         followers=tuple(_follower(robot, messages) for robot in robots if robot != names.LEADER),
         tracks={robot: track for robot, track in tracks.items() if track is not None},
         simulated_s=_last_stamp_ns(messages) / 1e9,
-        details=bag.metadata(METADATA_NAME),
+        details=details,
         ground=_ground(markers[-1]) if markers else None,
         left_plate=tuple(message.data for message in messages[_absolute(names.left_plate().name)]),
     )
     return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
 
 
-def _last_stamp_ns(messages: dict[str, list[Any]]) -> int:
+def load_displacements(path: str | Path, robot: str) -> DisplacementLog:
+    """Read a robot's displacements, residuals and commands, as its predictor got them: paired by their stamps.
+
+    Raises:
+        BagError: the bag is missing, no bag, empty or corrupted, or a topic has another message type than a run's.
+        AnalysisError: the bag has no displacements of this robot.
+    """
+    with read_bag(path) as bag:
+        topics = {f"/{robot}/{topic.name}": topic.type for topic in _LOGGED}
+        _require_displacements(bag, robot)
+        bag.require({topic: type_name for topic, type_name in topics.items() if topic in bag.topics})
+        messages: dict[str, list[Any]] = defaultdict(list)
+        for message in bag.messages(topics):
+            messages[message.topic].append(message.message)
+    by_stamp = [{entry.stamp_ns: entry.motion for entry in _stamped(messages[topic])} for topic in topics]
+    stamps = sorted(by_stamp[0])
+    columns = [
+        np.array([(found[stamp].u_m, found[stamp].v_m) if stamp in found else (math.nan, math.nan) for stamp in stamps])
+        for found in by_stamp
+    ]
+    return DisplacementLog(str(path), tuple(f"timestep {t}" for t in range(1, len(stamps) + 1)), *columns)
+
+
+def _require_displacements(bag: Bag, robot: str) -> None:
+    pattern = re.compile(rf"/([^/]+)/{names.DISPLACEMENT.name}")
+    robots = [match[1] for topic in bag.topics if (match := pattern.fullmatch(topic))]
+    if not robots:
+        raise AnalysisError(
+            f"{bag.path} has no displacements: no topic /{names.follower(1)}/{names.DISPLACEMENT.name}; give the bag "
+            "of 'formation run' or record that topic"
+        )
+    if robot not in robots:
+        raise AnalysisError(f"{bag.path} has no displacements of '{robot}'{suggestion(robot, robots)}")
+
+
+def _last_stamp_ns(messages: Mapping[str, Sequence[Any]]) -> int:
     """Return the latest simulated time that a message tells (log times may count on by nanoseconds)."""
     return max(
         (_stamp_ns(group[-1]) for group in messages.values() if group and hasattr(group[-1], "header")), default=0
@@ -80,7 +130,7 @@ def _robots(bag: Bag) -> list[str]:
     return [names.LEADER, *(names.follower(number) for number in sorted(int(number) for number in found))]
 
 
-def _topics(robots: Sequence[str]) -> dict[str, str]:
+def run_topics(robots: Sequence[str]) -> dict[str, str]:
     """Name the topics that the analysis reads, with their message types."""
     topics = {_absolute(topic.name): topic.type for topic in (names.SURFACE, names.left_plate())}
     for robot in robots:
@@ -96,7 +146,7 @@ def _absolute(name: str) -> str:
     return name if name.startswith("/") else f"/{name}"
 
 
-def _follower(robot: str, messages: dict[str, list[Any]]) -> FollowerRecord:
+def _follower(robot: str, messages: Mapping[str, Sequence[Any]]) -> FollowerRecord:
     moved, displacements, residuals, predictions = (_stamped(messages[f"/{robot}/{topic.name}"]) for topic in _MOTIONS)
     states = tuple(message.data for message in messages[f"/{robot}/{names.ALIGNMENT.name}"])
     return FollowerRecord(robot, moved, displacements, residuals, predictions, states)
@@ -106,9 +156,16 @@ def _stamped(messages: Sequence[Any]) -> tuple[Stamped, ...]:
     """Turn PoseWithCovarianceStamped messages into stamped displacements; NaN where a negative variance says 'none'."""
     none = Motion(math.nan, math.nan)
     return tuple(
-        Stamped(_stamp_ns(message), _motion(message.pose.pose) if message.pose.covariance[0] >= 0.0 else none)
+        Stamped(_stamp_ns(message), _motion(message.pose.pose), _covariance_uv(message.pose.covariance))
+        if message.pose.covariance[0] >= 0.0
+        else Stamped(_stamp_ns(message), none)
         for message in messages
     )
+
+
+def _covariance_uv(covariance: Any) -> tuple[float, float, float]:
+    """Turn a message's covariance, whose first two axes are x = v and y = -u, into those of (u, u), (u, v), (v, v)."""
+    return (float(covariance[7]), -float(covariance[1]), float(covariance[0]))
 
 
 def _stamp_ns(message: Any) -> int:
@@ -137,7 +194,9 @@ def _track(messages: Sequence[Any]) -> Track | None:
     return Track(stamps[order], positions[order], yaws[order])
 
 
-def _overhead(robots: Sequence[str], messages: dict[str, list[Any]], dot_height_m: float) -> dict[str, OverheadTrack]:
+def _overhead(
+    robots: Sequence[str], messages: Mapping[str, Sequence[Any]], dot_height_m: float
+) -> dict[str, OverheadTrack]:
     """Compare the tracker's last path of each robot with the true places of its dot."""
     tracks = {}
     for robot in robots:

@@ -9,6 +9,9 @@ formation error
     |e| with e = p_F - p_B - R(psi_B)(0, -d): actual minus desired place of base_link in world x, y when the follower
     reports (ground truth), d to the right of the beacon neighbour B (0.32 m by default). Over the timesteps: RMSE of
     |e|; bias, the mean of e in B's frame as u and v; scatter, the RMS distance from it. RMSE^2 = bias^2 + scatter^2.
+prediction coverage
+    share of the timesteps from 4 on whose ideal move, displacement + residual, lies inside the 90 % ellipse of the
+    prediction (a Gaussian's, by the published covariance).
 overhead error
     distance in world x, y between a robot's reference dot as the overhead tracker saw it and the dot's true place.
 heading error
@@ -32,6 +35,9 @@ from robot_formation.analysis.record import FollowerRecord, RunRecord, Stamped
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
 from robot_formation.control.motion import Motion
 from robot_formation.names import beacon_neighbour
+
+ELLIPSE_90 = -2.0 * math.log(0.1)
+"""Squared Mahalanobis distance of a 90 % ellipse: the quantile of chi-square with two degrees of freedom."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +143,7 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
     timesteps = tuple(_timestep(record, follower, t) for t in range(1, finished + 1))
     unfinished = _corrections(record, follower, finished + 1) if opened > finished else None
     values = totals(timesteps)
+    values["prediction_coverage_90"] = prediction_coverage(follower)
     values["timesteps_finished"] = finished
     values["timesteps_planned"] = record.timesteps_planned
     values["unfinished_timestep"] = None
@@ -173,6 +180,25 @@ def totals(timesteps: Sequence[Timestep]) -> dict[str, Any]:
         **_error_statistics(errors),
         "heading_error_rmse_rad": float(np.sqrt(np.mean(headings**2))) if headings.size else None,
     }
+
+
+def prediction_coverage(follower: FollowerRecord) -> float | None:
+    """Share of the counted timesteps whose ideal move lies in the prediction's 90 % ellipse; None if there are none."""
+    inside = []
+    for displacement, residual, prediction in zip(
+        follower.displacements[COLLECTION_TIMESTEPS:],
+        follower.residuals[COLLECTION_TIMESTEPS:],
+        follower.predictions[COLLECTION_TIMESTEPS - 1 :],
+        strict=False,
+    ):
+        uu, uv, vv = prediction.covariance_uv
+        if not (residual.motion.finite and prediction.motion.finite) or uu * vv - uv**2 <= 0.0:
+            continue
+        u_m = displacement.motion.u_m + residual.motion.u_m - prediction.motion.u_m
+        v_m = displacement.motion.v_m + residual.motion.v_m - prediction.motion.v_m
+        squared = (vv * u_m**2 - 2.0 * uv * u_m * v_m + uu * v_m**2) / (uu * vv - uv**2)
+        inside.append(squared <= ELLIPSE_90)
+    return sum(inside) / len(inside) if inside else None
 
 
 def overhead_errors(record: RunRecord) -> dict[str, dict[str, float]] | None:

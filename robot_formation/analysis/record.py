@@ -17,10 +17,11 @@ DOT_HEIGHT_M = 0.216
 
 @dataclass(frozen=True)
 class Stamped:
-    """A displacement and the simulated time it is a fact of, nanoseconds."""
+    """A displacement, the simulated time it is a fact of [ns], and its covariances (u, u), (u, v), (v, v) [m^2]."""
 
     stamp_ns: int
     motion: Motion
+    covariance_uv: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

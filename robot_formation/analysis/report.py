@@ -12,6 +12,7 @@ from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.figures import draw_corrections, draw_trajectory
 from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, Timestep
 from robot_formation.analysis.record import RunRecord
+from robot_formation.bag.reader import bag_name
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
 from robot_formation.control.motion import Motion
 
@@ -49,15 +50,30 @@ def write_pictures(record: RunRecord, analysis: RunAnalysis, folder: str | Path)
     Raises:
         AnalysisError: the folder or a picture can't be written.
     """
+    out = made_folder(folder)
+    return [
+        draw_trajectory(record, analysis, out / "trajectory.png"),
+        draw_corrections(record, analysis, out / "corrections.png"),
+    ]
+
+
+def pictures_folder(bag: str | Path) -> Path:
+    """Return where pictures of a bag go by default: a folder beside it, which need not exist."""
+    return Path(bag).resolve().with_name(f"{bag_name(bag)}_analysis")
+
+
+def made_folder(folder: str | Path) -> Path:
+    """Make a folder if it is missing.
+
+    Raises:
+        AnalysisError: it can't be made.
+    """
     out = Path(folder)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise AnalysisError(f"{out} can't be made: {error.strerror or error}; choose another folder") from error
-    return [
-        draw_trajectory(record, analysis, out / "trajectory.png"),
-        draw_corrections(record, analysis, out / "corrections.png"),
-    ]
+    return out
 
 
 def _table(follower: FollowerAnalysis) -> list[str]:

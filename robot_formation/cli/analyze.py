@@ -33,15 +33,14 @@ def run(args: argparse.Namespace) -> int:
     # Imported here, so that the other verbs don't pay for rosbags.
     from robot_formation.analysis.from_bag import load_run
     from robot_formation.analysis.quantities import analyse
-    from robot_formation.analysis.report import text_report, to_json, write_pictures
-    from robot_formation.bag.reader import bag_name
+    from robot_formation.analysis.report import pictures_folder, text_report, to_json, write_pictures
 
     record = load_run(args.bag)
     analysis = analyse(record)
     print(to_json(analysis) if args.json else text_report(record, analysis))
     if args.no_pictures or (args.json and args.out is None):
         return 0
-    folder = args.out or args.bag.resolve().with_name(f"{bag_name(args.bag)}_analysis")
+    folder = args.out or pictures_folder(args.bag)
     pictures = write_pictures(record, analysis, folder)
     if not args.json:
         print("\npictures: " + ", ".join(str(picture) for picture in pictures))

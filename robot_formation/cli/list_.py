@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
 def collect() -> dict[str, dict[str, str]]:
     """Collect names and descriptions by kind."""
     from robot_formation.experiment import scenario
-    from robot_formation.koopman.predictors import MODELS
+    from robot_formation.koopman.predictors import DESCRIPTIONS
     from robot_formation.surface import SURFACES
 
     tracks = {}
@@ -52,7 +52,7 @@ def collect() -> dict[str, dict[str, str]]:
     return {
         "tracks": tracks,
         "surfaces": {name: _first_line(kind) for name, kind in SURFACES.items()},
-        "predictors": {name: _first_line(model) for name, model in MODELS.items()},
+        "predictors": DESCRIPTIONS,
         "robots": {
             "leader": "drives the track, carries the tri-colour marker",
             "follower_1": "keeps 32 cm to the right of the leader; --set followers=N adds follower_2 .. follower_N",

@@ -12,10 +12,10 @@ from typing import Any
 
 import robot_formation
 from robot_formation import exit_codes
-from robot_formation.cli import analyze, calibrate, detect, doctor, list_, run, teach, test
+from robot_formation.cli import analyze, calibrate, detect, doctor, list_, predict, run, sweep, teach, test
 from robot_formation.errors import FormationError
 
-VERBS = (run, list_, analyze, calibrate, teach, detect, doctor, test)
+VERBS = (run, sweep, list_, analyze, predict, calibrate, teach, detect, doctor, test)
 
 EPILOG = """\
 exit codes: 0 done, 2 usage or bad input, 3 leader lost or plate left, 4 a node died, 130 interrupted

@@ -47,7 +47,15 @@ class FineTunerComponent(Component):
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
-        return [names.MOVE, names.camera_request(), names.DISPLACEMENT, names.RESIDUAL, names.ALIGNMENT, self._done]
+        return [
+            names.MOVE,
+            names.camera_request(),
+            names.COMMANDED,
+            names.DISPLACEMENT,
+            names.RESIDUAL,
+            names.ALIGNMENT,
+            self._done,
+        ]
 
     def details(self) -> dict[str, str]:
         """See `Component`."""
@@ -79,8 +87,8 @@ class FineTunerComponent(Component):
                     self._send(names.MOVE, conversions.move(motion, self._base, self.stamp_ns))
                 case core.RequestFrames(count):
                     self._send(names.camera_request(), conversions.uint32(count))
-                case core.Report(displacement, residual):
-                    self._report(displacement, residual)
+                case core.Report():
+                    self._report(action)
                 case core.Done(timestep):
                     self._send(self._done, conversions.uint32(timestep))
                 case core.State(text):
@@ -93,10 +101,12 @@ class FineTunerComponent(Component):
                         f"{self.place.robot} lost its beacon neighbour in timestep {self._tuner.timestep}",
                     )
 
-    def _report(self, displacement: Motion, residual: Motion | None) -> None:
-        self._send(names.DISPLACEMENT, conversions.displacement(displacement, self._base, self.stamp_ns))
-        known = residual is not None
-        message = conversions.displacement(
-            residual or Motion(), self._base, self.stamp_ns, (0.0,) * 4 if known else conversions.NO_ESTIMATE
-        )
-        self._send(names.RESIDUAL, message)
+    def _report(self, report: core.Report) -> None:
+        # The predictor waits for the pair, so what it may use beside them goes first.
+        for topic, motion in (
+            (names.COMMANDED, report.commanded),
+            (names.DISPLACEMENT, report.displacement),
+            (names.RESIDUAL, report.residual),
+        ):
+            covariance = conversions.NO_ESTIMATE if motion is None else (0.0,) * 4
+            self._send(topic, conversions.displacement(motion or Motion(), self._base, self.stamp_ns, covariance))

@@ -68,10 +68,13 @@ class RequestFrames:
 
 @dataclass(frozen=True)
 class Report:
-    """The timestep's net displacement and what is left by the camera's estimate (None: Target face not seen)."""
+    """The timestep's net displacement, what is left by the camera's estimate (None: Target face not seen), and what the
+    displacement would have been had the prediction move gone as commanded (None: its end is unknown).
+    """
 
     displacement: Motion
     residual: Motion | None
+    commanded: Motion | None
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,8 @@ class FineTuner:
         self._out_of_view = False
         self._resent = 0
         self._prediction: Motion | None = None
+        self._planned_move: Motion | None = None  # the prediction move, until it has ended
+        self._actuation_error: Motion | None = None
         self._frames: list[Sequence[Block]] = []
         self._frames_wanted = 0
         self._extensions = 0
@@ -150,11 +155,14 @@ class FineTuner:
         if self._phase is not Phase.MOVE:
             return [Warn("a 'moved' that nobody asked for is ignored")]
         self.stamp_ns = stamp_ns
+        planned, self._planned_move = self._planned_move, None
         if not motion.finite:
             return [
                 Warn("a 'moved' that is not finite is ignored: the displacement of this move is lost"),
                 *self._look(),
             ]
+        if planned is not None:
+            self._actuation_error = Motion(motion.x_m - planned.x_m, motion.y_m - planned.y_m)
         self._displacement = self._displacement.then(motion)
         self._alignment.moved(self._asked, motion)
         return self._look()
@@ -204,6 +212,7 @@ class FineTuner:
             return []
         self._alignment.restart(self.timestep)
         self._displacement = Motion()
+        self._actuation_error = None
         if self.timestep == 0:
             return [State("align"), *self._look()]
         return self._look(Phase.SIGHT) if self._alignment.looks_before else self._go(0.0)
@@ -214,6 +223,7 @@ class FineTuner:
         motion = Motion.from_uv(
             max(-self._p.max_u_m, min(self._p.max_u_m, wish.u_m)), max(-self._p.max_v_m, min(self._p.max_v_m, wish.v_m))
         )
+        self._planned_move = motion
         collecting = self.timestep <= COLLECTION_TIMESTEPS
         move = Motion(motion.x_m, motion.y_m, turn_rad)
         actions: list[Action] = [State("collect" if collecting else "predict"), *self._move(move)]
@@ -262,7 +272,10 @@ class FineTuner:
             return [*actions, *self._finish()]
         self._phase = Phase.PREDICTION
         self._previous = Motion(self._displacement.x_m, self._displacement.y_m)
-        return [*actions, Report(self._displacement, self._alignment.offset())]
+        commanded = None
+        if (error := self._actuation_error) is not None:
+            commanded = Motion(self._displacement.x_m - error.x_m, self._displacement.y_m - error.y_m)
+        return [*actions, Report(self._displacement, self._alignment.offset(), commanded)]
 
     def _move(self, motion: Motion) -> list[Action]:
         self._phase = Phase.MOVE

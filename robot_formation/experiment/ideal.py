@@ -1,0 +1,99 @@
+"""The noise floor of a run: the same controller, but its prediction moves are the ideal ones, by ground truth.
+
+What is left for the camera to correct then comes from the robot's own scatter and the camera's noise; no predictor can
+do better on average. `ideal` commands the ideal move itself, `ideal+close` takes off the actuation bias as the
+project's predictor has learned it in the same run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from robot_formation import conversions, names
+from robot_formation.components.fine_tuner import FineTunerNodeParameters
+from robot_formation.components.predictor import PredictorComponent
+from robot_formation.components.world import WorldNodeParameters
+from robot_formation.control.alignment import AlignmentParameters
+from robot_formation.control.motion import Motion
+from robot_formation.experiment.in_process import InProcessRun, absolute
+from robot_formation.experiment.scenario import Scenario
+from robot_formation.parameters import from_mapping
+from robot_formation.world.camera import Camera
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import Pose
+
+IDEAL = ("ideal", "ideal+close")
+_ITERATIONS = 8
+
+
+class IdealRun(InProcessRun):
+    """A run whose prediction moves, from timestep 4 on, are replaced by ideal ones."""
+
+    def __init__(self, scenario: Scenario, listen: Callable[[str, Any], None], *, close: bool) -> None:
+        self._poses: dict[str, Pose] = {}
+        self._predicting: set[str] = set()
+        self._odometry = {absolute("", names.ground_truth_odom(robot).name): robot for robot in scenario.robots}
+        world = from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world")
+        self._face = TargetFace(Camera(world.make_surface(), world), world)
+        self._alignment = from_mapping(
+            FineTunerNodeParameters, scenario.parameters("fine_tuner"), where="fine_tuner"
+        ).alignment
+        super().__init__(scenario, listen=listen)
+        self._predictors: dict[str, PredictorComponent] = {}
+        for hosted in self._hosted:
+            if close and isinstance(hosted.component, PredictorComponent):
+                self._predictors[hosted.namespace] = hosted.component
+
+    def _send(self, namespace: str, topic: names.Topic, message: Any) -> None:
+        if (robot := self._odometry.get(absolute(namespace, topic.name))) is not None:
+            self._poses[robot] = _pose(message.pose.pose)
+        elif topic == names.ALIGNMENT and message.data == "predict":
+            self._predicting.add(namespace)
+        elif topic == names.MOVE and namespace in self._predicting:
+            self._predicting.discard(namespace)
+            motion = self._ideal(namespace)
+            message = conversions.move(motion, message.header.frame_id, conversions.stamp_of(message))
+        super()._send(namespace, topic, message)
+
+    def _ideal(self, namespace: str) -> Motion:
+        """Find the move after which the camera would see no offset, by fixed-point iteration on its own estimate."""
+        robot = namespace.removeprefix("/")
+        start, neighbour = self._poses[robot], self._poses[names.beacon_neighbour(robot)]
+        x_m = y_m = 0.0
+        for _ in range(_ITERATIONS):
+            there = Pose(start.place((x_m, y_m, 0.0)), start.orientation)
+            dx_m, dy_m = self._face.offset(there, neighbour, self._alignment)
+            x_m, y_m = x_m + dx_m, y_m + dy_m
+        predictor = self._predictors.get(namespace)
+        bias_u, bias_v = predictor.actuation_bias() if predictor is not None else (0.0, 0.0)
+        return Motion(x_m - bias_v, y_m + bias_u)
+
+
+class TargetFace:
+    """What a noise-free camera would say of the neighbour's Target face."""
+
+    def __init__(self, camera: Camera, world: WorldParameters) -> None:
+        half, top = world.marker.edge_m / 2.0, world.marker.top_m
+        self._camera = camera
+        self._centre_px = world.camera.centre_x_px
+        self._corners = np.array([(x, -half, z) for x in (-half, half) for z in (top - 2.0 * half, top)])
+
+    def offset(self, robot: Pose, neighbour: Pose, alignment: AlignmentParameters) -> tuple[float, float]:
+        """Way to the formation position as the fine-tuner reckons it, (x, y) in metres."""
+        corners = self._corners @ neighbour.matrix().T + np.asarray(neighbour.position)
+        pixels = self._camera.project(robot, corners)
+        width, height = np.ptp(pixels, axis=0)
+        column = float(pixels[:, 0].min() + width / 2.0)
+        side = max(float(width), float(height))
+        return (
+            (column - self._centre_px) / alignment.slope_px_per_m,
+            alignment.side_px_m / side - alignment.distance_m,
+        )
+
+
+def _pose(message: Any) -> Pose:
+    p, q = message.position, message.orientation
+    return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))

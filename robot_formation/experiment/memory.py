@@ -1,0 +1,44 @@
+"""A whole run in memory: from a scenario to its analysis without a bag."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Any
+
+from robot_formation import exit_codes
+from robot_formation.analysis.from_bag import record_of, run_topics
+from robot_formation.analysis.record import RunRecord
+from robot_formation.experiment.in_process import InProcessRun
+from robot_formation.experiment.scenario import Scenario
+
+OUTCOMES = {exit_codes.DONE: "done", exit_codes.LOST: "lost"}
+
+
+def run_in_memory(
+    scenario: Scenario, make_run: Callable[[Scenario, Callable[[str, Any], None]], InProcessRun] | None = None
+) -> RunRecord:
+    """Run a scenario in this process and return its record, as a bag of it would give it.
+
+    Args:
+        scenario: what to run.
+        make_run: builds the run from the scenario and its listener; by default a plain `InProcessRun`.
+
+    Raises:
+        FormationError: if a component refuses its parameters, or the run stands still.
+    """
+    wanted = run_topics(scenario.robots)
+    messages: dict[str, list[Any]] = defaultdict(list)
+
+    def listen(topic: str, message: Any) -> None:
+        if topic in wanted:
+            messages[topic].append(message)
+
+    run = make_run(scenario, listen) if make_run is not None else InProcessRun(scenario, listen=listen)
+    code, _ = run.run()
+    details = {
+        "scenario": scenario.setup.name,
+        "timesteps": str(scenario.parameters("leader")["timesteps"]),
+        "outcome": OUTCOMES.get(code, "incomplete"),
+    }
+    return record_of(scenario.robots, messages, details)

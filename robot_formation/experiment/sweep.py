@@ -1,0 +1,294 @@
+"""Many in-process runs over tracks, surfaces, predictors and seeds; each yields one row of a table.
+
+The table is a CSV file that grows row by row, so that a sweep which was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
+from dataclasses import asdict, dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from robot_formation.analysis.quantities import analyse
+from robot_formation.errors import FormationError
+from robot_formation.experiment import scenario as scenarios
+from robot_formation.experiment.ideal import IDEAL, IdealRun
+from robot_formation.experiment.in_process import InProcessRun
+from robot_formation.experiment.memory import run_in_memory
+from robot_formation.koopman.predictors import NAMES
+from robot_formation.parameters import suggestion
+from robot_formation.surface import SURFACES
+
+# The comparison's common ground: the paper's fine-tuner, and pictures only when one is waited for.
+CONDITIONS = ("fine_tuner.mode=paper", "world.camera.mode=on_demand", "world.overhead.enabled=false")
+RUNS_NAME = "runs.csv"
+PLAN_NAME = "sweep.json"
+_GOES_ON = "the same command with the same --out goes on"
+
+
+class SweepError(FormationError):
+    """A sweep can't be planned, or its folder can't be used."""
+
+
+class Task(NamedTuple):
+    """One run of a sweep."""
+
+    track: str
+    surface: str
+    predictor: str
+    seed: int
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a run yields; quantities as in analysis.quantities, None where unavailable."""
+
+    track: str
+    surface: str
+    predictor: str
+    seed: int
+    outcome: str
+    timesteps: int
+    correction_m: float | None
+    correction_u_m: float | None
+    correction_v_m: float | None
+    correction_turn_rad: float | None
+    movements_per_timestep: float | None
+    formation_error_rmse_m: float | None
+    heading_error_rmse_rad: float | None
+    prediction_coverage_90: float | None
+
+    @property
+    def task(self) -> Task:
+        """The run that it is of."""
+        return Task(self.track, self.surface, self.predictor, self.seed)
+
+    @property
+    def lost(self) -> bool:
+        """Whether the run didn't come to its end: the leader was lost, or a robot left the plate."""
+        return self.outcome != "done"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a sweep consists of: every combination, with settings KEY=VALUE for all of them."""
+
+    tracks: tuple[str, ...]
+    surfaces: tuple[str, ...]
+    predictors: tuple[str, ...]
+    seeds: tuple[int, ...]
+    settings: tuple[str, ...] = ()
+
+    def check(self) -> None:
+        """Check every name and setting before anything is run.
+
+        Raises:
+            FormationError: naming what is misspelt or out of range.
+        """
+        for kind, chosen, known in (
+            ("track", self.tracks, scenarios.track_names()),
+            ("surface", self.surfaces, list(SURFACES)),
+            ("predictor", self.predictors, [*NAMES, *IDEAL]),
+        ):
+            if not chosen:
+                raise SweepError(f"no {kind} is given")
+            for name in chosen:
+                if name not in known:
+                    raise SweepError(f"no {kind} '{name}'{suggestion(name, known)}")
+            if len(set(chosen)) != len(chosen):
+                raise SweepError(f"a {kind} is given twice")
+        if not self.seeds:
+            raise SweepError("no seed is given; --seeds 0:200 is from 0 to 199")
+        for setting in self.settings:
+            if (key := setting.partition("=")[0]) in ("predictor.name", "world.surface", "seed"):
+                raise SweepError(f"--set {key}: a sweep sets it itself; use --predictors, --surfaces or --seeds")
+        for track in self.tracks:
+            for surface in self.surfaces:
+                build(Task(track, surface, self.predictors[0], self.seeds[0]), self.settings).check()
+
+    def tasks(self) -> Iterator[Task]:
+        """Yield every run; all predictors of a seed together, so that an unfinished sweep has pairs."""
+        for seed in self.seeds:
+            for track in self.tracks:
+                for surface in self.surfaces:
+                    for predictor in self.predictors:
+                        yield Task(track, surface, predictor, seed)
+
+
+def build(task: Task, settings: Sequence[str]) -> scenarios.Scenario:
+    """Build a run's scenario.
+
+    Raises:
+        FormationError: naming what is misspelt or out of range.
+    """
+    scenario = scenarios.with_surface(scenarios.load_track(task.track), task.surface)
+    predictor = {"ideal": "previous", "ideal+close": "formation"}.get(task.predictor, task.predictor)
+    return scenarios.override(scenario, [*CONDITIONS, *settings, f"predictor.name={predictor}", f"seed={task.seed}"])
+
+
+def run_task(task: Task, settings: Sequence[str]) -> Row:
+    """Carry out one run.
+
+    Raises:
+        SweepError: if the scenario can't be run to an end; the text names the run.
+    """
+
+    def make_run(scenario: scenarios.Scenario, listen: Callable[[str, Any], None]) -> InProcessRun:
+        if task.predictor in IDEAL:
+            return IdealRun(scenario, listen, close=task.predictor == "ideal+close")
+        return InProcessRun(scenario, listen=listen)
+
+    try:
+        analysis = analyse(run_in_memory(build(task, settings), make_run))
+    except FormationError as error:
+        run = f"track {task.track}, surface {task.surface}, predictor {task.predictor}, seed {task.seed}"
+        raise SweepError(f"{run}: {error}") from None
+    totals = analysis.followers[0].totals
+    names = [field.name for field in fields(Row)][6:]
+    return Row(
+        *task,
+        outcome=analysis.outcome,
+        timesteps=totals["timesteps_finished"],
+        **{name: totals[name] for name in names},
+    )
+
+
+class Table:
+    """The growing CSV file of a sweep's folder."""
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        """Open a folder: a new one, or that of an earlier sweep with the same settings.
+
+        Raises:
+            SweepError: if the folder holds something else, or a sweep with other settings.
+        """
+        self._path = folder / RUNS_NAME
+        record = folder / PLAN_NAME
+        if record.exists():
+            self._require_same(record, plan)
+        elif folder.exists() and any(folder.iterdir()):
+            raise SweepError(f"{folder} is not empty and holds no sweep; choose another --out")
+        folder.mkdir(parents=True, exist_ok=True)
+        record.write_text(json.dumps(asdict(plan), indent=2) + "\n", encoding="utf-8")
+        self.rows: dict[Task, Row] = {}
+        if self._path.exists():
+            self.rows = {row.task: row for row in read_rows(self._path)}
+        # Written anew, so that a half-written last line is gone; put in place at once, so that no row ever is.
+        unfinished = self._path.with_suffix(".partial")
+        with unfinished.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow([field.name for field in fields(Row)])
+            writer.writerows(_cells(row) for row in self.rows.values())
+        unfinished.replace(self._path)
+
+    def add(self, row: Row) -> None:
+        """Append a row; it is on disk when this returns."""
+        self.rows[row.task] = row
+        with self._path.open("a", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerow(_cells(row))
+
+    @staticmethod
+    def _require_same(record: Path, plan: Plan) -> None:
+        try:
+            earlier = json.loads(record.read_text(encoding="utf-8"))
+            settings = earlier["settings"]
+        except (OSError, ValueError, KeyError, TypeError):
+            raise SweepError(f"{record}: no record of a sweep; choose another --out") from None
+        if list(settings) != list(plan.settings):
+            raise SweepError(f"{record.parent} holds a sweep with other settings ({settings}); choose another --out")
+
+
+def read_rows(path: Path) -> Iterator[Row]:
+    """Read the rows of a sweep's table; a half-written last one is left out.
+
+    Raises:
+        SweepError: if the file is no such table.
+    """
+    columns = {field.name: str(field.type) for field in fields(Row)}
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = file.readlines()
+    except (OSError, ValueError) as error:
+        raise SweepError(f"{path}: can't read it: {error}") from None
+    # A number that was cut off is a number too: only a line with its end is whole.
+    reader = csv.reader(line for line in lines if line.endswith("\n"))
+    if next(reader, None) != list(columns):
+        raise SweepError(f"{path}: no table of a sweep's runs; choose another --out")
+    for cells in reader:
+        try:
+            pairs = zip(columns.items(), cells, strict=True)
+            yield Row(**{name: _value(kind, cell) for (name, kind), cell in pairs})
+        except ValueError:
+            raise SweepError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
+
+
+def remaining(plan: Plan, rows: Mapping[Task, Row]) -> list[Task]:
+    """List the runs of a plan that are not in the table yet."""
+    return [task for task in plan.tasks() if task not in rows]
+
+
+def chosen(plan: Plan, rows: Mapping[Task, Row]) -> list[Row]:
+    """List the rows of a plan, in its order."""
+    return [rows[task] for task in plan.tasks() if task in rows]
+
+
+def carry_out(tasks: Iterable[Task], settings: Sequence[str], jobs: int) -> Iterator[Row]:
+    """Run tasks on this machine's cores by joblib; yield rows as they come.
+
+    Raises:
+        SweepError: if a run can't come to its end, or a worker process dies.
+    """
+    from joblib import Parallel, delayed
+
+    # One run in a worker at a time; a few wait, so that no worker idles.
+    pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="3*n_jobs")
+    try:
+        yield from pool(delayed(run_task)(task, settings) for task in tasks)
+    except BrokenExecutor:
+        raise SweepError(f"a worker process died (too little memory for --jobs {jobs}?); {_GOES_ON}") from None
+
+
+def carry_out_by_dask(tasks: Iterable[Task], settings: Sequence[str], scheduler: str) -> Iterator[Row]:
+    """Run tasks on a Dask cluster; yield rows as they come.
+
+    Raises:
+        SweepError: if Dask isn't installed, the scheduler doesn't answer or goes away, or a run can't be done there.
+    """
+    try:
+        from dask.distributed import Client, as_completed
+    except ImportError:
+        raise SweepError("--dask needs the package 'distributed'; pip install 'dask[distributed]'") from None
+    # What happens to the connection is told in a line here, not by a traceback in its log.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    try:
+        client = Client(scheduler, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise SweepError(f"no Dask scheduler answers at {scheduler}: {str(error).splitlines()[0]}") from None
+    with client:
+        for future in as_completed(client.map(partial(run_task, settings=settings), list(tasks), pure=False)):
+            if future.cancelled():
+                raise SweepError(f"the Dask cluster at {scheduler} is gone; {_GOES_ON}")
+            problem = future.exception()
+            if isinstance(problem, FormationError):
+                raise problem
+            if problem is not None:
+                raise SweepError(f"a Dask worker can't do the runs: {type(problem).__name__}: {problem}; {_GOES_ON}")
+            yield future.result()
+
+
+def _cells(row: Row) -> list[Any]:
+    return ["" if value is None else value for value in asdict(row).values()]
+
+
+def _value(kind: str, text: str) -> Any:
+    if kind == "str":
+        return text
+    if kind == "int":
+        return int(text)
+    return float(text) if text else None

@@ -1,0 +1,185 @@
+"""Models that forecast by a finite-dimensional Koopman operator K, learned from pairs of displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from robot_formation.koopman.online_dmd import OnlineDMD
+from robot_formation.koopman.predictors.dictionary_text import dictionary_from_text
+from robot_formation.koopman.predictors.models import Insight, Matrix, Vector, array, optional, vector
+from robot_formation.koopman.predictors.parameters import EdmdParameters, PredictorParameters
+from robot_formation.koopman.windowed_dmd import WindowedDMD
+
+# An open-loop power of K may grow as it likes; this is far beyond any forecast and far below overflow.
+_LARGEST_STATE_M = 1e100
+
+
+class Literal:
+    """The paper's Algorithm 1 as printed: K from the first three displacements, then K^n x_3, blind to what follows.
+
+    The printed loop feeds its own forecast back as the measurement, so its innovation y - K x is zero and K stays.
+    """
+
+    def __init__(self, parameters: PredictorParameters) -> None:
+        self._collected: list[Vector] = []
+        self._k: Matrix | None = None
+        self._state: Vector = np.zeros(2)
+
+    def observe(self, x: Vector) -> None:
+        """See `Model`; from the fourth on only the number of observations matters."""
+        if self._k is not None:
+            self._state = np.clip(self._k @ self._state, -_LARGEST_STATE_M, _LARGEST_STATE_M)
+            return
+        self._collected.append(x)
+        self._state = x
+        if len(self._collected) == 3:
+            data = np.column_stack(self._collected)
+            self._k = data[:, 1:] @ np.linalg.pinv(data[:, :-1])
+
+    def forecast(self) -> Vector:
+        """See `Model`."""
+        return self._state if self._k is None else self._k @ self._state
+
+    def insight(self) -> Insight:
+        """See `Model`."""
+        condition = None
+        if self._k is not None:
+            condition = float(np.linalg.cond(np.column_stack(self._collected[:-1])))
+        return Insight(k=self._k, condition_number=condition)
+
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return {
+            "collected": [x.tolist() for x in self._collected],
+            "k": None if self._k is None else self._k.tolist(),
+            "state": self._state.tolist(),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        self._collected = [vector(x) for x in state["collected"]]
+        self._k = None if state["k"] is None else array(state["k"], 2, 2)
+        self._state = vector(state["state"])
+
+
+class Measured:
+    """Online DMD with measured pairs: what the paper's algorithm must have been to react to anything.
+
+    Forecast K x_t, with K the least-squares fit of all pairs (x_i, x_i+1) so far; the previous displacement until the
+    first two pairs are complete, as in the paper's collection phase.
+    """
+
+    def __init__(self, parameters: PredictorParameters) -> None:
+        self._dmd = OnlineDMD(2, forgetting=parameters.forgetting)
+        self._pairs = 0
+        self._last: Vector | None = None
+        self._innovation: Vector | None = None
+
+    def observe(self, x: Vector) -> None:
+        """See `Model`."""
+        if self._last is not None:
+            self._innovation = self._dmd.update(self._last, x)
+            self._pairs += 1
+        self._last = x
+
+    def forecast(self) -> Vector:
+        """See `Model`."""
+        assert self._last is not None  # by the protocol
+        return self._last if self._pairs < 2 else self._dmd.k.dot(self._last)
+
+    def insight(self) -> Insight:
+        """See `Model`."""
+        if self._pairs < 2:
+            return Insight()
+        return Insight(self._dmd.k, self._dmd.condition_number, self._innovation)
+
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return {
+            "dmd": self._dmd.state(),
+            "pairs": self._pairs,
+            "last": optional(self._last),
+            "innovation": optional(self._innovation),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        _require_same_settings(self._dmd, state["dmd"])
+        self._dmd = OnlineDMD.from_state(state["dmd"])
+        self._pairs = int(state["pairs"])
+        self._last = vector(state["last"]) if state["last"] is not None else None
+        self._innovation = vector(state["innovation"]) if state["innovation"] is not None else None
+
+
+class Edmd:
+    """Online EDMD with a dictionary of the user's: K Psi(x_t), with persistence (K = I) as the prior.
+
+    Displacements are divided by a length first, so that observables of different degree are alike in size.
+    """
+
+    def __init__(self, parameters: PredictorParameters | EdmdParameters) -> None:
+        p = self._p = parameters.edmd if isinstance(parameters, PredictorParameters) else parameters
+        self._dictionary = dictionary_from_text(p.dictionary)
+        self._rows = [row for row in self._dictionary.state_rows if row is not None]
+        size = self._dictionary.size
+        self._dmd: OnlineDMD | WindowedDMD = (
+            WindowedDMD(size, p.window, forgetting=p.forgetting, prior_weight=p.prior)
+            if p.window
+            else OnlineDMD(size, forgetting=p.forgetting, prior_weight=p.prior)
+        )
+        self._history: list[Vector] = []
+        self._lifted: Vector | None = None
+        self._innovation: Vector | None = None
+
+    def observe(self, x: Vector) -> None:
+        """See `Model`."""
+        self._history = [*self._history[-self._dictionary.history :], x] if self._dictionary.history else [x]
+        if len(self._history) <= self._dictionary.history:
+            return
+        lifted = self._dictionary(np.column_stack(self._history) / self._p.scale_m)[:, 0]
+        if self._lifted is not None:
+            self._innovation = self._dmd.update(self._lifted, lifted)
+        self._lifted = lifted
+
+    def forecast(self) -> Vector:
+        """See `Model`; the last displacement until the delays are filled."""
+        if self._lifted is None:
+            return self._history[-1]
+        return np.asarray(self._p.scale_m * (self._dmd.k[self._rows] @ self._lifted))
+
+    def insight(self) -> Insight:
+        """See `Model`; the innovation is that of the state, in metres."""
+        innovation = None if self._innovation is None else self._p.scale_m * self._innovation[self._rows]
+        notes = {"observables": ", ".join(self._dictionary.names)}
+        return Insight(self._dmd.k, self._dmd.condition_number, innovation, notes)
+
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return {
+            "dmd": self._dmd.state(),
+            "history": [x.tolist() for x in self._history],
+            "lifted": optional(self._lifted),
+            "innovation": optional(self._innovation),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        _require_same_settings(self._dmd, state["dmd"])
+        self._dmd = type(self._dmd).from_state(state["dmd"])
+        size = self._dictionary.size
+        self._history = [vector(x) for x in state["history"]]
+        self._lifted = vector(state["lifted"], size) if state["lifted"] is not None else None
+        self._innovation = vector(state["innovation"], size) if state["innovation"] is not None else None
+
+
+def _require_same_settings(fresh: OnlineDMD | WindowedDMD, state: Mapping[str, Any]) -> None:
+    """Refuse a fit that was made with other settings: it would go on with those.
+
+    Raises:
+        ValueError: if the settings differ.
+    """
+    if state["settings"] != fresh.state()["settings"]:
+        raise ValueError("it was learned with other parameters (dictionary, prior, window or forgetting)")

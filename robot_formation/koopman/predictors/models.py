@@ -1,0 +1,226 @@
+"""One-step models of a sequence of displacements: what they share, and those without an operator.
+
+State x_t = (u_t, v_t), metres, u to the right and v forward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation.koopman.predictors.parameters import PredictorParameters, TrendParameters
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Insight:
+    """What the model looks like inside, for diagnostics; absent parts are None."""
+
+    k: Matrix | None = None
+    condition_number: float | None = None
+    innovation: Vector | None = None
+    notes: Mapping[str, str] | None = None
+
+    @property
+    def eigenvalues(self) -> NDArray[np.complex128] | None:
+        """Eigenvalues of K, the finite-dimensional Koopman operator."""
+        return None if self.k is None else np.linalg.eigvals(self.k).astype(complex)
+
+
+class Model(Protocol):
+    """A one-step model: it is shown each displacement once, in order, and forecasts the next."""
+
+    def observe(self, x: Vector) -> None:
+        """Take the measured displacement (2,) of a timestep."""
+
+    def forecast(self) -> Vector:
+        """Forecast the next displacement (2,); called after at least one observation."""
+
+    def insight(self) -> Insight:
+        """Show K and its quality where the model has them."""
+
+    def state(self) -> dict[str, Any]:
+        """Take all that it has learned, as numbers, lists and None."""
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Put back what `state` took from a model with the same parameters."""
+
+
+class Previous:
+    """The paper's baseline, "without prediction": the previous timestep's displacement."""
+
+    def __init__(self, parameters: PredictorParameters) -> None:
+        self._last: Vector = np.zeros(2)
+
+    def observe(self, x: Vector) -> None:
+        """See `Model`."""
+        self._last = x
+
+    def forecast(self) -> Vector:
+        """See `Model`."""
+        return self._last
+
+    def insight(self) -> Insight:
+        """See `Model`."""
+        return Insight()
+
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return {"last": self._last.tolist()}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        self._last = vector(state["last"])
+
+
+class Ewma:
+    """Exponentially weighted moving average: the smoothing that any forecast of noisy displacements has to beat."""
+
+    def __init__(self, parameters: PredictorParameters) -> None:
+        self._gain = parameters.ewma.gain
+        self._mean: Vector | None = None
+
+    def observe(self, x: Vector) -> None:
+        """See `Model`."""
+        self._mean = x if self._mean is None else self._mean + self._gain * (x - self._mean)
+
+    def forecast(self) -> Vector:
+        """See `Model`."""
+        assert self._mean is not None  # by the protocol
+        return self._mean
+
+    def insight(self) -> Insight:
+        """See `Model`."""
+        return Insight()
+
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return {"mean": optional(self._mean)}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        self._mean = None if state["mean"] is None else vector(state["mean"])
+
+
+class TrendFilter:
+    """Kalman filter of level and damped trend, both axes by themselves but with the same gains.
+
+    level' = level + damping trend + noise, trend' = damping trend + noise, measured = level + noise (local linear
+    trend model with damping; Harvey, "Forecasting, structural time series models and the Kalman filter", 1989).
+    """
+
+    def __init__(self, parameters: TrendParameters) -> None:
+        self._p = parameters
+        self._transition = np.array([[1.0, parameters.damping], [0.0, parameters.damping]])
+        self._change = np.diag([parameters.level_m**2, parameters.trend_m**2])
+        self._state: Matrix | None = None  # rows: level and trend of the timestep to come; columns: axes
+        self._covariance: Matrix = np.zeros((2, 2))
+
+    def start(self, level: Vector, sigma_m: float) -> None:
+        """Begin with a prior of the level (2,) of the first timestep."""
+        self._state = np.stack([level, np.zeros(2)])
+        self._covariance = np.diag([sigma_m**2, self._p.start_trend_m**2])
+
+    def observe(self, x: Vector) -> None:
+        """Take a value (2,); the first one is the level if there was no prior."""
+        noise = self._p.noise_m**2
+        if self._state is None:
+            self._state = np.stack([x, np.zeros(2)])
+            self._covariance = np.diag([noise, self._p.start_trend_m**2])
+        else:
+            gain = self._covariance[:, 0] / (self._covariance[0, 0] + noise)
+            self._state = self._state + gain[:, None] * (x - self._state[0])
+            self._covariance = self._covariance - gain[:, None] * self._covariance[0]
+        f = self._transition
+        self._state = f @ self._state
+        covariance = f @ self._covariance @ f.T + self._change
+        self._covariance = (covariance + covariance.T) / 2.0
+
+    def forecast(self) -> Vector:
+        """Forecast the next value (2,); zero before there is any."""
+        return np.zeros(2) if self._state is None else self._state[0].copy()
+
+    def state(self) -> dict[str, Any]:
+        """Take all that it has learned."""
+        return {
+            "state": None if self._state is None else self._state.tolist(),
+            "covariance": self._covariance.tolist(),
+        }
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Put back what `state` took."""
+        self._state = None if state["state"] is None else array(state["state"], 2, 2)
+        self._covariance = covariance(state["covariance"], 2, 2)
+
+
+class KalmanTrend:
+    """Kalman filter of a level with a damped trend."""
+
+    def __init__(self, parameters: PredictorParameters) -> None:
+        self._filter = TrendFilter(parameters.kalman_trend)
+
+    def observe(self, x: Vector) -> None:
+        """See `Model`."""
+        self._filter.observe(x)
+
+    def forecast(self) -> Vector:
+        """See `Model`."""
+        return self._filter.forecast()
+
+    def insight(self) -> Insight:
+        """See `Model`."""
+        return Insight()
+
+    def state(self) -> dict[str, Any]:
+        """See `Model`."""
+        return self._filter.state()
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """See `Model`."""
+        self._filter.restore(state)
+
+
+def vector(values: Any, size: int = 2) -> Vector:
+    """Read a vector from a state.
+
+    Raises:
+        ValueError: if it has another length, or is not finite.
+    """
+    return array(values, size)
+
+
+def array(values: Any, *shape: int) -> NDArray[np.float64]:
+    """Read an array of this shape from a state.
+
+    Raises:
+        ValueError: if it has another shape, or is not finite.
+    """
+    found = np.array(values, dtype=float)
+    if found.shape != shape or not np.isfinite(found).all():
+        raise ValueError(f"finite numbers of shape {shape} are expected")
+    return found
+
+
+def covariance(values: Any, *shape: int) -> NDArray[np.float64]:
+    """Read covariance matrices of this shape (..., n, n) from a state.
+
+    Raises:
+        ValueError: if they have another shape, or are none.
+    """
+    found = array(values, *shape)
+    turned = np.swapaxes(found, -1, -2)
+    eigenvalues = np.linalg.eigvalsh(found)  # ascending
+    if not (found == turned).all() or not (eigenvalues[..., 0] >= -1e-9 * abs(eigenvalues[..., -1])).all():
+        raise ValueError("covariance matrices are expected")
+    return found
+
+
+def optional(values: Vector | None) -> list[float] | None:
+    """Write a vector that may be missing into a state."""
+    return None if values is None else [float(value) for value in values]

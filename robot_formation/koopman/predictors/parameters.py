@@ -1,0 +1,176 @@
+"""Parameters of every predictor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from robot_formation.parameters import ParameterError, parameter
+
+CLOSABLE = ("previous", "ewma", "kalman_trend", "measured", "edmd")
+"""Models that may run with residual closing and bias learning, as NAME+close."""
+NAMES = (*CLOSABLE, "literal", "formation", *(f"{name}+close" for name in CLOSABLE))
+
+
+@dataclass(frozen=True)
+class EwmaParameters:
+    """Exponentially weighted moving average."""
+
+    gain: float = parameter(0.4, "Weight of the newest displacement", low=0.0, high=1.0)
+
+
+@dataclass(frozen=True)
+class TrendParameters:
+    """Kalman filter of a level with a damped trend, each axis by itself."""
+
+    noise_m: float = parameter(
+        0.002, "Standard deviation of a displacement about its level", unit="m", low=1e-6, high=1.0
+    )
+    level_m: float = parameter(
+        0.0004, "Standard deviation of the level's own change in a timestep", unit="m", low=0.0, high=1.0
+    )
+    trend_m: float = parameter(
+        0.0003, "Standard deviation of the trend's change in a timestep", unit="m", low=0.0, high=1.0
+    )
+    start_trend_m: float = parameter(
+        0.001, "Standard deviation of the trend before the first displacement", unit="m", low=0.0, high=1.0
+    )
+    damping: float = parameter(0.9, "Share of the trend that is left after a timestep", low=0.0, high=1.0)
+
+
+@dataclass(frozen=True)
+class EdmdParameters:
+    """Online EDMD with a dictionary of the user's and a prior: persistence."""
+
+    dictionary: str = parameter(
+        "constant identity",
+        "Observables, separated by spaces: constant, identity, monomials:DEGREE, rbf:COUNT, delay:COUNT",
+    )
+    prior: float = parameter(
+        0.01,
+        "Weight of the prior (K = I), as the squared length of an observable that counts as much",
+        low=1e-12,
+        high=1e6,
+    )
+    scale_m: float = parameter(
+        0.05,
+        "Displacements are divided by this length before the observables are computed",
+        unit="m",
+        low=1e-4,
+        high=10.0,
+    )
+    window: int = parameter(0, "Newest pairs that count; 0 for all", low=0, high=100000)
+    forgetting: float = parameter(1.0, "Weight of a pair relative to the next newer one", low=0.01, high=1.0)
+
+
+@dataclass(frozen=True)
+class ClosingParameters:
+    """Closing of the camera's residual and learning of the actuation bias ('formation' and NAME+close).
+
+    Three lists, of equal length, describe a bank of filters from one that trusts in steadiness to one that follows
+    every change.
+    """
+
+    residual_u_m: float = parameter(
+        0.006, "Standard deviation of the camera's residual along u (side length)", unit="m", low=1e-6, high=1.0
+    )
+    residual_v_m: float = parameter(
+        0.001, "Standard deviation of the camera's residual along v (column)", unit="m", low=1e-6, high=1.0
+    )
+    start_u_m: float = parameter(
+        0.007, "Standard deviation of the residual along u before timestep 1", unit="m", low=1e-6, high=1.0
+    )
+    start_v_m: float = parameter(
+        0.002, "Standard deviation of the residual along v before timestep 1", unit="m", low=1e-6, high=1.0
+    )
+    step_u_m: float = parameter(
+        0.0, "Leader-induced displacement along u known beforehand", unit="m", low=-1.0, high=1.0
+    )
+    step_v_m: float = parameter(
+        0.05, "Leader-induced displacement along v known beforehand", unit="m", low=-1.0, high=1.0
+    )
+    step_sigma_u_m: float = parameter(0.003, "Standard deviation of it along u", unit="m", low=1e-6, high=1.0)
+    step_sigma_v_m: float = parameter(0.0025, "Standard deviation of it along v", unit="m", low=1e-6, high=1.0)
+    noise_m: tuple[float, ...] = parameter(
+        (0.0016, 0.0025, 0.005),
+        "Filters: standard deviation of the leader-induced displacement about its level",
+        unit="m",
+        low=1e-6,
+        high=1.0,
+    )
+    level_m: tuple[float, ...] = parameter(
+        (0.0003, 0.001, 0.012),
+        "Filters: standard deviation of the level's own change in a timestep",
+        unit="m",
+        low=0.0,
+        high=1.0,
+    )
+    trend_m: tuple[float, ...] = parameter(
+        (0.0, 0.0005, 0.0),
+        "Filters: standard deviation of the trend's change in a timestep",
+        unit="m",
+        low=0.0,
+        high=1.0,
+    )
+    trend_start_m: float = parameter(
+        0.0003, "Standard deviation of the level's trend at first", unit="m", low=0.0, high=1.0
+    )
+    discount: float = parameter(0.9, "Weight of a past innovation relative to the next newer one", low=0.01, high=1.0)
+    trend_damping: float = parameter(0.8, "Share of the trend that is left after a timestep", low=0.0, high=1.0)
+    bias_m: float = parameter(
+        0.008, "Standard deviation of the actuation bias before anything is known", unit="m", low=0.0, high=1.0
+    )
+    bias: TrendParameters = TrendParameters(
+        noise_m=0.003, level_m=0.001, trend_m=0.0002, start_trend_m=0.0005, damping=0.9
+    )
+
+    def __post_init__(self) -> None:
+        """Check that every filter has its three numbers."""
+        lengths = {len(self.noise_m), len(self.level_m), len(self.trend_m)}
+        if len(lengths) != 1 or not self.noise_m:
+            raise ParameterError(
+                "predictor: 'closing.noise_m', 'level_m' and 'trend_m' need one number for each filter"
+            )
+
+
+@dataclass(frozen=True)
+class FormationParameters:
+    """The project's own predictor: models combined by how well each has forecast lately, residual and bias closed."""
+
+    discount: float = parameter(0.9, "Weight of a past error relative to the next newer one", low=0.01, high=1.0)
+    handicap: float = parameter(
+        1.0,
+        "How much the Koopman model is behind persistence at first (logarithm of the weights' ratio)",
+        low=0.0,
+        high=100.0,
+    )
+    scale_u_m: float = parameter(0.006, "Error along u that makes a model unlikely", unit="m", low=1e-6, high=1.0)
+    scale_v_m: float = parameter(0.003, "Error along v that makes a model unlikely", unit="m", low=1e-6, high=1.0)
+    edmd: EdmdParameters = EdmdParameters(prior=1.0, forgetting=0.9)
+
+
+@dataclass(frozen=True)
+class PredictorParameters:
+    """Which predictor runs, and the parameters of all."""
+
+    name: str = parameter("measured", "Predictor", choices=NAMES)
+    forgetting: float = parameter(
+        1.0, "Weight of a pair relative to the next newer one ('measured'); 1 forgets nothing", low=0.01, high=1.0
+    )
+    max_u_m: float = parameter(0.1, "Bound of the forecast along u", unit="m", low=0.0, high=10.0)
+    max_v_m: float = parameter(0.2, "Bound of the forecast along v", unit="m", low=0.0, high=10.0)
+    sigma_u_m: float = parameter(
+        0.0045, "Standard deviation of a forecast along u before errors tell", unit="m", low=0.0, high=1.0
+    )
+    sigma_v_m: float = parameter(
+        0.0025, "Standard deviation of a forecast along v before errors tell", unit="m", low=0.0, high=1.0
+    )
+    sigma_weight: float = parameter(2.0, "How many forecasts these standard deviations count for", low=0.01, high=1e6)
+    state_file: str = parameter(
+        "", "File that keeps what was learned, so that a restarted node goes on; {robot} is its robot; empty: none"
+    )
+    load_state: bool = parameter(False, "Begin with what state_file holds, if it is there")
+    ewma: EwmaParameters = EwmaParameters()
+    kalman_trend: TrendParameters = TrendParameters()
+    edmd: EdmdParameters = EdmdParameters()
+    closing: ClosingParameters = ClosingParameters()
+    formation: FormationParameters = FormationParameters()
