@@ -47,6 +47,9 @@ class FineTunerParameters:
     max_u_m: float = parameter(
         0.05, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
     )
+    calibration_file: str = parameter(
+        "", "YAML file of 'formation calibrate vision': its values go before those of 'alignment'; empty: none"
+    )
     look: LookParameters = LookParameters()
     alignment: AlignmentParameters = AlignmentParameters()
     precise: PreciseParameters = PreciseParameters()
