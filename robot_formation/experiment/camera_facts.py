@@ -25,6 +25,26 @@ def camera_facts(scenario: Scenario) -> dict[str, Any]:
     return {f"world.{name}": world[name] for name in _NAMES}
 
 
+def camera_values(scenario: Scenario) -> dict[str, float]:
+    """List the values `alignment.*` that the scenario's calibration file gives the fine-tuner; empty without a file.
+
+    Raises:
+        CalibrationError: if the file can't be used.
+    """
+    path = scenario.parameters("fine_tuner")["calibration_file"]
+    return dict(load_vision(path).alignment) if path else {}
+
+
+def describe_camera(scenario: Scenario) -> str:
+    """Say in a line of progress which calibration of the camera is used; empty without a file."""
+    path = scenario.parameters("fine_tuner")["calibration_file"]
+    if not path:
+        return ""
+    measured = load_vision(path).measured_with
+    said = [f"{name} {measured[name]}" for name in ("seed", "surface") if name in measured]
+    return f"camera calibration: {path}{', measured with ' if said else ''}{', '.join(said)}"
+
+
 def check_camera(scenario: Scenario) -> None:
     """Check that the fine-tuner's calibration file, if it has one, can be used and is of this scenario's camera.
 

@@ -62,7 +62,7 @@ def positions(step_m: float, width_m: float) -> list[Position]:
     Raises:
         CalibrationError: if the step doesn't fit.
     """
-    count = round(REACH_M / step_m)
+    count = round(REACH_M / step_m) if math.isfinite(step_m) and step_m > 0.0 else 0
     if not 1 <= count <= _FINEST or not math.isclose(count * step_m, REACH_M):
         raise CalibrationError(
             f"a step of {step_m:g} m doesn't divide the grid's {REACH_M} m into whole steps of 0.01 m or more; take "
