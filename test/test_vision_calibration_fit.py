@@ -11,6 +11,7 @@ from robot_formation.control.alignment import FRONT, REAR, TARGET
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.sightings import Sighting, overlay
 from robot_formation.control.vision_fit import (
+    alone_range,
     compared_distances,
     difference_px,
     face_views,
@@ -95,6 +96,14 @@ def test_views_that_do_not_determine_the_curves_are_refused():
     stuck = [Sighting(s.u_m, s.v_m, 0.0, True, 22, (same,)) for s in field()]
     with pytest.raises(CalibrationError, match="lie on no"):
         fit_camera(face_views(stuck), EDGE_M)
+
+
+def test_the_face_is_alone_up_to_the_first_place_that_shows_another():
+    front = Block(FRONT, 120, 60, 10, 40)
+    places = [seen(0.3, v / 100) for v in range(-4, 7)]
+    shown = [Sighting(s.u_m, s.v_m, 0.0, True, 22, (*s.blocks, front)) if s.v_m in (0.04, 0.05) else s for s in places]
+    assert alone_range(face_views(shown), 0.3) == (-0.04, 0.03)
+    assert alone_range(face_views(shown), 0.4) == (0.0, 0.0)
 
 
 def looks(u, v, *signatures):

@@ -13,6 +13,7 @@ from robot_formation.control.vision_fit import (
     WINDOW_M,
     CameraFit,
     FaceView,
+    alone_range,
     compared_distances,
     difference_px,
     pan_distances,
@@ -52,6 +53,10 @@ class VisionResult:
         found = pan_distances(self.views)
         return found, compared_distances(found)
 
+    def alone(self) -> dict[float, tuple[float, float]]:
+        """Give the range of v in which the Target block is seen alone, by distance u, m."""
+        return {u: alone_range(self.views, u) for u in pan_distances(self.views)}
+
     def measured_difference_px(self, distances_m: Sequence[float]) -> float | None:
         """Largest measured difference of the column inside the window; None if nowhere all distances were seen."""
         found = difference_px(self.views, distances_m)
@@ -68,7 +73,7 @@ def vision_text(result: VisionResult) -> str:
     fit = result.fit
     looked = [s for s in result.sightings if s.attainable]
     distances, compared = result.distances()
-    low, high = fit.window_px()
+    left, right = fit.window_px()
     side = float(fit.side(FORMATION_DISTANCE_M))
     per_cm = float(fit.side(FORMATION_DISTANCE_M - 0.005) - fit.side(FORMATION_DISTANCE_M + 0.005))
     lines = [
@@ -76,10 +81,14 @@ def vision_text(result: VisionResult) -> str:
         "",
         *_map(result.grid()),
         "",
+        "Target block alone, follower parallel to its neighbour: v [cm] from the places looked at",
+        *(f"  u {u * 100:g} cm: {low * 100:+g} to {high * 100:+g}" for u, (low, high) in result.alone().items()),
+        "",
         "pan: column of the Target block [px] = target_x - slope v in formation",
         f"  target_x {fit.target_x_px:.2f} ± {fit.errors['target_x_px']:.2f} px, "
         f"slope {fit.slope_px_per_m / 100:.3f} ± {fit.errors['slope_px_per_m'] / 100:.3f} px/cm",
-        f"  fine-tuning window, v of -{WINDOW_M * 100:g} to {WINDOW_M * 100:g} cm: columns {low:.0f} to {high:.0f} px",
+        f"  fine-tuning window, v of -{WINDOW_M * 100:g} to {WINDOW_M * 100:g} cm: "
+        f"columns {left:.0f} to {right:.0f} px",
     ]
     for chosen in (compared, distances) if compared != distances else (compared,):
         measured = result.measured_difference_px(chosen)
@@ -118,6 +127,7 @@ def vision_json(result: VisionResult) -> dict[str, Any]:
             {"u_m": p.u_m, "v_m": p.v_m, "area": p.area, "angles": p.angles, "attainable": p.attainable, "seen": p.seen}
             for p in grid
         ],
+        "target_alone": [{"u_m": u, "v_m": list(ends)} for u, ends in result.alone().items()],
         "pan": {
             "window_m": [-WINDOW_M, WINDOW_M],
             "window_px": list(fit.window_px()),

@@ -12,6 +12,7 @@ robot's middle that looks exactly sideways.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -182,6 +183,17 @@ def pan_distances(views: Iterable[FaceView]) -> list[float]:
     for view in views:
         places[view.u_m] = places.get(view.u_m, 0) + 1
     return sorted(u for u, count in places.items() if count >= 3)
+
+
+def alone_range(views: Iterable[FaceView], u_m: float) -> tuple[float, float]:
+    """Tell how far behind and ahead, v [m], a follower at a distance u sees the Target face alone throughout."""
+    ordered = sorted((view.v_m, view.alone) for view in views if view.u_m == u_m)
+    ends = []
+    for sign in (-1.0, 1.0):
+        side = sorted((sign * v, alone) for v, alone in ordered if sign * v >= 0.0)
+        seen = itertools.takewhile(lambda place: place[1], side)
+        ends.append(sign * max((v for v, _ in seen), default=0.0) + 0.0)
+    return ends[0], ends[1]
 
 
 def compared_distances(distances_m: Sequence[float]) -> list[float]:
