@@ -1,6 +1,8 @@
 """`formation calibrate vision` as a person types it: grid, table, bag, pictures, going on, and what is refused."""
 
+import contextlib
 import csv
+import io
 import json
 import math
 from concurrent.futures import BrokenExecutor
@@ -13,12 +15,13 @@ from robot_formation.bag.reader import read_bag
 from robot_formation.cli.main import main
 from robot_formation.control.alignment import AlignmentParameters
 from robot_formation.control.calibration import CalibrationError
+from robot_formation.control.marker_view import EdgeParameters
 from robot_formation.control.sightings import Sighting
 from robot_formation.control.vision_calibration import load_vision
 from robot_formation.experiment import calibration_vision, vision_table
 from robot_formation.experiment.calibration_vision import conditions_of
 from robot_formation.experiment.scenario import load_track, override
-from robot_formation.experiment.vision_grid import ANGLES_DEG, Position, measure, positions
+from robot_formation.experiment.vision_grid import ANGLES_DEG, Position, measure, positions, true_faces
 from robot_formation.experiment.vision_table import COLUMNS, VisionTable, read_table
 from robot_formation.vision.block import Block
 
@@ -49,7 +52,11 @@ def complaint(capsys, *arguments):
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp("vision")
-    assert main(["calibrate", "vision", "--seed", "3", "--out", str(folder), *QUICK]) == 0
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        assert main(["calibrate", "vision", "--seed", "3", "--out", str(folder), *QUICK]) == 0
+    assert "areas, all relative angles overlaid" in said.getvalue()
+    assert f"fine_tuner.calibration_file={folder / 'vision.yaml'}" in said.getvalue()
     return folder
 
 
@@ -88,6 +95,18 @@ def test_a_look_sees_the_face_where_the_pinhole_projects_it_and_nothing_where_ro
     assert straight.frames == 32  # block filtering 40 shows a block in frame 21, and the last three must agree
 
 
+def test_the_true_faces_are_those_of_the_pinhole():
+    world = conditions_of(override(load_track("two"), ["world.surface=plane"])).world
+    faces = true_faces(world, Sighting(0.3, 0.02, 0.0, True))
+    columns = [157.5 + 273.7 * (x - 0.02) / 0.308 for x in (-0.03, 0.03)]
+    rows = [103.5 - 273.7 * (z - 0.126) / 0.308 for z in (0.216, 0.156)]
+    assert faces[1] == pytest.approx(np.array([[column, row] for column in columns for row in rows]))
+    ahead = true_faces(world, Sighting(0.3, 0.05, 0.0, True))[2]
+    assert ahead[0, 0] == pytest.approx(157.5 - 273.7 * 0.02 / 0.308)
+    assert ahead[2, 0] == pytest.approx(157.5 - 273.7 * 0.02 / 0.368)
+    assert 2 not in true_faces(world, Sighting(-0.02, 0.2, 0.0, True))  # it reaches behind the lens
+
+
 def test_a_look_depends_on_seed_and_position_only():
     first, second = (conditions_of(override(load_track("two"), ["world.surface=plane", f"seed={n}"])) for n in (1, 2))
     places = [Position(0.4, 0.1, (0.0, 15.0)), Position(0.45, 0.12, (0.0, 15.0))]
@@ -118,6 +137,7 @@ def test_the_files_agree_with_each_other_and_with_the_nodes_defaults(measured, c
     assert sum(said["areas"].values()) == len(said["positions"]) == 9
     assert {(p["u_m"], p["v_m"]): p["area"] for p in said["positions"]}[0.45, 0.0] == "target"
     assert said["pan"]["window_px"][1] - said["pan"]["window_px"][0] == pytest.approx(50.0, abs=3.0)
+    assert abs(said["edges"]["target_left_px"]["mean_px"] - EdgeParameters().target_left_px) < 1.0
     for picture in said["pictures"].values():
         assert (measured / picture).stat().st_size > 10_000
 
@@ -179,10 +199,7 @@ def test_other_conditions_need_another_folder_or_force(measured, capsys, tmp_pat
     assert "without its record" in complaint(capsys, "calibrate", "vision", "--out", tmp_path, *QUICK)
     record.write_text("[")
     assert "no record" in complaint(capsys, "calibrate", "vision", "--out", tmp_path, *QUICK)
-    code, captured = call(capsys, "--out", tmp_path, "--force", *QUICK)
-    assert code == 0
-    assert "areas, all relative angles overlaid" in captured.out
-    assert json.loads(record.read_text())["seed"] == 0
+    assert record.read_text() == "["  # nothing was replaced
 
 
 def test_a_table_keeps_whole_positions_only_and_damaged_lines_are_told(tmp_path):
@@ -237,7 +254,10 @@ def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(capsys, tmp_path, arg
 
 
 def test_a_camera_that_never_sees_the_marker_keeps_its_table_and_says_what_is_missing(capsys, tmp_path):
-    setting = ("--set", "world.camera.pan_deg=-90")
+    for name in ("vision.csv", "vision.json", "vision.yaml"):
+        (tmp_path / name).write_text("of an older calibration")
+    (tmp_path / "vision_bag.partial").mkdir()
+    setting = ("--force", "--set", "world.camera.pan_deg=-90")
     line = complaint(capsys, "calibrate", "vision", "--out", tmp_path, *setting, *QUICK)
     assert "is the marker in view" in line
     assert {"vision.csv", "vision_areas.png", "vision_bag"} <= {path.name for path in tmp_path.iterdir()}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
+from robot_formation.control.edge_bias import EdgeBias
 from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.control.sightings import Overlay, Sighting, overlay
 from robot_formation.control.vision_fit import (
@@ -41,6 +42,7 @@ class VisionResult:
     sightings: Sequence[Sighting]
     views: Sequence[FaceView]
     fit: CameraFit
+    edges: Mapping[str, EdgeBias]
 
     def grid(self) -> list[Overlay]:
         """List the positions of the grid: those that were looked at under the most angles."""
@@ -108,6 +110,10 @@ def vision_text(result: VisionResult) -> str:
         f"fitted to {fit.views} views; residuals {fit.column_rms_px:.2f} px RMS of columns, "
         f"{fit.side_rms_px:.2f} px of side lengths",
     ]
+    lines += ["", "edges of whole faces, reported minus true [px]: mean, scatter of one look, looks"]
+    for name, bias in result.edges.items():
+        said = name.removesuffix("_px").replace("_", " ")
+        lines.append(f"  {said:13} {bias.mean_px:+6.2f} {bias.scatter_px:6.2f} {bias.views:5d}")
     return "\n".join(lines)
 
 
@@ -161,6 +167,7 @@ def vision_json(result: VisionResult) -> dict[str, Any]:
         "alignment": fit.alignment(),
         "lead_m": fit.lead_m,
         "standard_errors": dict(fit.errors),
+        "edges": {name: asdict(bias) for name, bias in result.edges.items()},
         "residuals": {"views": fit.views, "column_rms_px": fit.column_rms_px, "side_rms_px": fit.side_rms_px},
     }
 

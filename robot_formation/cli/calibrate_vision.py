@@ -92,10 +92,12 @@ def _evaluate(
     from robot_formation.analysis.vision_curve_figures import draw_pan, draw_side
     from robot_formation.analysis.vision_report import VisionResult
     from robot_formation.bag.writer import PARTIAL_SUFFIX
+    from robot_formation.control.edge_bias import edge_biases
     from robot_formation.control.vision_calibration import VisionCalibration, save_vision
     from robot_formation.control.vision_fit import face_views, fit_camera
     from robot_formation.experiment.calibration_vision import BAG_NAME, record_of, write_bag
     from robot_formation.experiment.camera_facts import camera_facts
+    from robot_formation.experiment.vision_grid import true_faces
 
     bag = folder / BAG_NAME
     if not bag.exists():
@@ -107,7 +109,8 @@ def _evaluate(
     body = (world.chassis.length_m, world.chassis.width_m)
     draw_areas(sightings, body, edge, f"Blocks around the beacon neighbour · {told}", folder / PICTURES["areas"])
     views = face_views(sightings)
-    result = VisionResult(sightings, views, fit_camera(views, edge))
+    edges = edge_biases((sighting, true_faces(world, sighting)) for sighting in sightings if sighting.blocks)
+    result = VisionResult(sightings, views, fit_camera(views, edge), edges)
     measured_with = {"seed": scenario.setup.seed, "surface": world.surface, "step_m": step_m, **camera_facts(scenario)}
     save_vision(folder / CALIBRATION_FILE, VisionCalibration(result.fit.alignment(), measured_with))
     distances, compared = result.distances()

@@ -12,9 +12,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
+
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
 from robot_formation.components.world import WorldNodeParameters
+from robot_formation.control.alignment import FRONT, REAR, TARGET
 from robot_formation.control.calibration import CalibrationError
+from robot_formation.control.edge_bias import Corners
 from robot_formation.control.fine_tuner import LookParameters
 from robot_formation.control.sightings import Sighting
 from robot_formation.experiment.alignment_trial import FOLLOWER, Start, gap_m, poses
@@ -31,6 +35,10 @@ FINE_REACH_M = 0.1
 """Farthest v of the finer set along v."""
 _FINEST = 45
 _DIGITS = 6
+
+
+# Left and right edge of each face as seen from outside: forward and to the left of the marker's middle, in half edges.
+_FACE_SIDES = {TARGET: ((-1, -1), (1, -1)), FRONT: ((1, -1), (1, 1)), REAR: ((-1, 1), (-1, -1))}
 
 
 @dataclass(frozen=True)
@@ -99,6 +107,14 @@ def stand(world: WorldNodeParameters, u_m: float, v_m: float, clockwise_deg: flo
     return _bench(world, None).stand(u_m, v_m, clockwise_deg)
 
 
+def true_faces(world: WorldNodeParameters, sighting: Sighting) -> dict[int, Corners]:
+    """Project the corners of the neighbour's marker faces, by signature, as `edge_biases` takes them.
+
+    Faces that reach behind the lens are left out.
+    """
+    return _bench(world, None).faces(sighting)
+
+
 class _Bench:
     """Ground, camera and detector; made once per process."""
 
@@ -111,6 +127,18 @@ class _Bench:
     def stand(self, u_m: float, v_m: float, clockwise_deg: float) -> tuple[Pose, Pose]:
         leader, follower = poses(self._surface, Start(u_m, v_m, clockwise_deg))
         return leader.pose(self._surface, self._world), follower.pose(self._surface, self._world)
+
+    def faces(self, sighting: Sighting) -> dict[int, Corners]:
+        leader, follower = self.stand(sighting.u_m, sighting.v_m, sighting.clockwise_deg)
+        rotation, lens = self._camera.optical_frame(follower)
+        marker = self._world.marker
+        half, heights = marker.edge_m / 2.0, (marker.top_m, marker.top_m - marker.edge_m)
+        found = {}
+        for signature, sides in _FACE_SIDES.items():
+            corners = np.array([leader.place((x * half, y * half, z)) for x, y in sides for z in heights])
+            if np.all((corners - lens) @ rotation[2] > self._world.camera.near_m):
+                found[signature] = self._camera.project(follower, corners)
+        return found
 
     def look(self, sensor: Sensor, position: Position, angle: float, look: LookParameters) -> Sighting:
         leader, follower = self.stand(position.u_m, position.v_m, angle)
