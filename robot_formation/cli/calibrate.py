@@ -1,4 +1,4 @@
-"""`formation calibrate`: measure a robot's motors and sensing wheels against the one-point reference."""
+"""`formation calibrate`: a robot's motors and sensing wheels against the one-point reference, and its camera."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robot_formation.cli.calibrate_vision import DESCRIPTION as VISION_DESCRIPTION
+from robot_formation.cli.calibrate_vision import add_options as add_vision_options
+from robot_formation.cli.calibrate_vision import run_vision
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
     from robot_formation.experiment.calibration_course import Course
     from robot_formation.experiment.scenario import Scenario
 
-DESCRIPTION = "Measure the robots of a scenario, each alone in the middle of the plate, in one process."
+DESCRIPTION = "Measure the robots of a scenario, each alone in the middle of the plate, or the follower's camera."
 MOTORS_DESCRIPTION = """\
 Drive each robot of the scenario over preset wheel rotations (followers along v and u, the leader along v, and turns),
 measure the distances by the reference dot, fit the calibration curves, and write them to motors.yaml with a picture
@@ -34,19 +37,27 @@ ENCODERS_PICTURE = "encoders.png"
 def add_parser(subparsers: Any) -> None:
     """Add the verb and what it calibrates to the command line."""
     parser = subparsers.add_parser(
-        "calibrate", help="measure motors or encoders of a scenario's robots", description=DESCRIPTION
+        "calibrate", help="measure motors, encoders or camera of a scenario's robots", description=DESCRIPTION
     )
     whats = parser.add_subparsers(dest="what", metavar="WHAT", required=True)
     motors = whats.add_parser("motors", help="fit wheel rotation to distance", description=MOTORS_DESCRIPTION)
-    _add_options(motors, repeats=10)
+    _add_options(motors)
+    _add_drives(motors, repeats=10)
     motors.set_defaults(run=run_motors)
     encoders = whats.add_parser("encoders", help="compare the instruments", description=ENCODERS_DESCRIPTION)
     encoders.add_argument("--robot", metavar="NAME", default="follower_1", help="which robot (default: follower_1)")
-    _add_options(encoders, repeats=5)
+    _add_options(encoders)
+    _add_drives(encoders, repeats=5)
     encoders.set_defaults(run=run_encoders)
+    vision = whats.add_parser(
+        "vision", help="blocks around the neighbour: areas, pan and side-length curves", description=VISION_DESCRIPTION
+    )
+    _add_options(vision)
+    add_vision_options(vision)
+    vision.set_defaults(run=run_vision)
 
 
-def _add_options(parser: argparse.ArgumentParser, *, repeats: int) -> None:
+def _add_options(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--track", metavar="NAME", help="preset track whose robots are measured: one, two (default), ...")
     what.add_argument("--scenario", metavar="FILE", type=Path, help="scenario file whose robots are measured")
@@ -55,6 +66,14 @@ def _add_options(parser: argparse.ArgumentParser, *, repeats: int) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="any parameter, as in 'run'; may be repeated"
     )
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder for the files (default: calibrations/SCENARIO_seedN)"
+    )
+    parser.add_argument("--force", action="store_true", help="replace files of an older calibration")
+    parser.add_argument("--json", action="store_true", help="print JSON and nothing else on standard output")
+
+
+def _add_drives(parser: argparse.ArgumentParser, *, repeats: int) -> None:
     parser.add_argument(
         "--repeats",
         metavar="N",
@@ -69,11 +88,6 @@ def _add_options(parser: argparse.ArgumentParser, *, repeats: int) -> None:
         default=0.0,
         help="standard deviation of the observer's x and y, in metres (default: 0)",
     )
-    parser.add_argument(
-        "--out", metavar="DIR", type=Path, help="folder for the files (default: calibrations/SCENARIO_seedN)"
-    )
-    parser.add_argument("--force", action="store_true", help="replace files of an older calibration")
-    parser.add_argument("--json", action="store_true", help="print JSON and nothing else on standard output")
 
 
 def run_motors(args: argparse.Namespace) -> int:
@@ -145,7 +159,7 @@ def run_encoders(args: argparse.Namespace) -> int:
 def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
     """Put the scenario together whose robots are measured, on the ground to measure on.
 
-    Without curves, the calibration file that it names is left out: it may be what is to be measured only now.
+    Without curves, the calibration files that it names are left out: they may be what is to be measured only now.
 
     Raises:
         FormationError: naming what is misspelt or out of range.
@@ -159,7 +173,8 @@ def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
         scenario = scenarios.with_value(scenario, "seed", args.seed)
     scenario = scenarios.override(scenario, args.set)
     if not with_curves:
-        scenario = scenarios.with_value(scenario, "drive.calibration_file", "")
+        for node in ("drive", "fine_tuner"):
+            scenario = scenarios.with_value(scenario, f"{node}.calibration_file", "")
     scenario.check()
     return scenario
 
@@ -180,19 +195,34 @@ def free_folder(args: argparse.Namespace, scenario: Scenario, files: tuple[str, 
     Raises:
         FormationError: if one of the files is there already and --force isn't given, or the folder can't be made.
     """
-    from robot_formation.paths import default_calibrations_dir
-
-    folder: Path = args.out or default_calibrations_dir() / f"{scenario.setup.name}_seed{scenario.setup.seed}"
+    folder = _folder_name(args, scenario)
     for name in files:
         if (folder / name).exists() and not args.force:
             raise FormationError(
                 f"{folder / name} exists already and is not overwritten; choose another folder with --out, or "
                 "replace it with --force"
             )
+    return output_folder(args, scenario)
+
+
+def output_folder(args: argparse.Namespace, scenario: Scenario) -> Path:
+    """Make the output folder, whatever is in it.
+
+    Raises:
+        FormationError: if it can't be made.
+    """
+    folder = _folder_name(args, scenario)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FormationError(f"{folder} can't be made: {error.strerror}; choose another folder with --out") from error
+    return folder
+
+
+def _folder_name(args: argparse.Namespace, scenario: Scenario) -> Path:
+    from robot_formation.paths import default_calibrations_dir
+
+    folder: Path = args.out or default_calibrations_dir() / f"{scenario.setup.name}_seed{scenario.setup.seed}"
     return folder
 
 

@@ -127,12 +127,15 @@ def default_bag(scenario: Scenario) -> Path:
 
 def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResult:
     """Run the scenario in the way that the options ask for."""
+    from robot_formation.experiment.camera_facts import describe_camera
     from robot_formation.experiment.drive_curves import describe_curves
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
     say(describe_curves(scenario))
+    if camera := describe_camera(scenario):
+        say(camera)
     if args.in_process:
         from robot_formation.experiment.in_process import run_in_process
         from robot_formation.launching.processes import run_metadata

@@ -122,9 +122,9 @@ def default_folder() -> Path:
     return next(path for path in (default_bags_dir() / f"{stem}{tail}" for tail in tails) if not path.exists())
 
 
-def with_progress(rows: Iterable[Any], count: int) -> Iterator[Any]:
+def with_progress(rows: Iterable[Any], count: int, what: str = "runs") -> Iterator[Any]:
     """Pass rows on and tell standard error how many there are, how fast they come and how long the rest will take."""
-    began, last = time.monotonic(), 0.0
+    began = last = time.monotonic()
     terminal = sys.stderr.isatty()
     for number, row in enumerate(rows, 1):
         yield row
@@ -134,7 +134,7 @@ def with_progress(rows: Iterable[Any], count: int) -> Iterator[Any]:
         last = now
         rate = number / max(now - began, 1e-9)
         left = (count - number) / rate
-        text = f"{number}/{count} runs, {60.0 * rate:.0f} per minute, {_duration(left)} left"
+        text = f"{number}/{count} {what}, {60.0 * rate:.0f} per minute, {_duration(left)} left"
         print(f"\r{text:<60}" if terminal else text, end="" if terminal and number < count else "\n", file=sys.stderr)
 
 

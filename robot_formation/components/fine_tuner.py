@@ -10,6 +10,7 @@ from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.control import fine_tuner as core
 from robot_formation.control.motion import Motion
+from robot_formation.control.vision_calibration import calibrated
 from robot_formation.parameters import parameter
 
 
@@ -30,7 +31,7 @@ class FineTunerComponent(Component):
 
     def __init__(self, parameters: FineTunerNodeParameters, place: Place) -> None:
         super().__init__(place)
-        self._tuner = core.FineTuner(parameters)
+        self._tuner = core.FineTuner(calibrated(parameters))
         self._neighbour = names.formation_done(names.beacon_neighbour(place.robot), place.formation)
         listeners = ("leader", "fine_tuner")[: parameters.done_listeners]
         self._done = names.formation_done(place.robot, place.formation, listeners=listeners)

@@ -65,6 +65,7 @@ class Verdict(Enum):
 
     MOVE = "move"
     LOOK = "look"
+    SEARCH = "search"
     ALIGNED = "aligned"
     UNALIGNED = "unaligned"
     LOST = "lost"
@@ -72,7 +73,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Decision:
-    """The verdict of a look, the correction that goes with MOVE, and the reason in words."""
+    """The verdict of a look, the motion that goes with MOVE and SEARCH, and the reason in words."""
 
     verdict: Verdict
     motion: Motion = Motion()

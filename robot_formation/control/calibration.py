@@ -45,11 +45,7 @@ class MotorCalibration:
 
     def differences(self, facts: Mapping[str, Any]) -> list[str]:
         """Name the facts that this calibration was measured with other values of; unknown names are no difference."""
-        return [
-            f"{name} {self.measured_with[name]} instead of {value}"
-            for name, value in facts.items()
-            if name in self.measured_with and self.measured_with[name] != value
-        ]
+        return differences(self.measured_with, facts)
 
 
 def limits(parameters: DriveParameters) -> dict[str, float]:
@@ -85,26 +81,47 @@ def load_calibration(path: str | Path) -> MotorCalibration:
     Raises:
         CalibrationError: if it can't be read or a robot, an axis or a curve in it is wrong.
     """
+    robots, facts = read_sections(path, "robots", what="motor calibration", verb="formation calibrate motors")
+    return MotorCalibration(
+        {str(robot): _curves(curves, f"{path}: {robot}") for robot, curves in robots.items()},
+        facts,
+    )
+
+
+def read_sections(path: str | Path, section: str, *, what: str, verb: str) -> tuple[Mapping[str, Any], dict[str, Any]]:
+    """Read a calibration file's mapping of this name, and what it was measured with.
+
+    Args:
+        path: of the file.
+        section: name of the mapping that holds the calibration.
+        what: kind of calibration, for messages.
+        verb: command that measures one, for messages.
+
+    Raises:
+        CalibrationError: if it can't be read or holds no such calibration.
+    """
     try:
         content = yaml.safe_load(Path(path).read_bytes())
     except OSError as error:
-        raise CalibrationError(
-            f"{path}: can't be read ({error.strerror}); measure one with 'formation calibrate motors'"
-        ) from error
+        raise CalibrationError(f"{path}: can't be read ({error.strerror}); measure one with '{verb}'") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise CalibrationError(f"{path}: is no YAML ({' '.join(str(error).split())[:120]})") from error
-    robots = content.get("robots") if isinstance(content, Mapping) else None
-    if not isinstance(robots, Mapping) or not robots:
-        raise CalibrationError(
-            f"{path}: holds no motor calibration (a mapping 'robots'); measure one with 'formation calibrate motors'"
-        )
+    found = content.get(section) if isinstance(content, Mapping) else None
+    if not isinstance(found, Mapping) or not found:
+        raise CalibrationError(f"{path}: holds no {what} (a mapping '{section}'); measure one with '{verb}'")
     facts = content.get("measured_with") or {}
     if not isinstance(facts, Mapping):
         raise CalibrationError(f"{path}: 'measured_with' must hold names and values, not {facts!r}")
-    return MotorCalibration(
-        {str(robot): _curves(curves, f"{path}: {robot}") for robot, curves in robots.items()},
-        {str(name): value for name, value in facts.items()},
-    )
+    return found, {str(name): value for name, value in facts.items()}
+
+
+def differences(measured_with: Mapping[str, Any], facts: Mapping[str, Any]) -> list[str]:
+    """Name the facts that a calibration was measured with other values of; unknown names are no difference."""
+    return [
+        f"{name} {measured_with[name]} instead of {value}"
+        for name, value in facts.items()
+        if name in measured_with and measured_with[name] != value
+    ]
 
 
 def save_calibration(path: str | Path, calibration: MotorCalibration) -> None:

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from robot_formation.control.alignment import AlignmentParameters, Decision, PaperAlignment, Verdict
+from robot_formation.control.alignment import AlignmentParameters, Decision, Verdict
+from robot_formation.control.alignment_modes import AlignmentMode, PaperMode
+from robot_formation.control.alignment_precise import PreciseAlignment, PreciseParameters
 from robot_formation.control.motion import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
@@ -26,6 +28,9 @@ class LookParameters:
     frames: int = parameter(22, "Frames of a look: block filtering 40 shows a new block in frame 21", low=1, high=600)
     stable_frames: int = parameter(3, "Last frames that must report the same blocks", low=1, high=600)
     extra_frames: int = parameter(10, "Frames asked for when the blocks are not stable", low=1, high=600)
+    max_requests: int = parameter(
+        3, "Requests for frames that don't come before the camera counts as dead", low=0, high=100
+    )
     max_extensions: int = parameter(3, "Extensions of a look before its last frame is taken as it is", low=0, high=100)
 
 
@@ -33,7 +38,7 @@ class LookParameters:
 class FineTunerParameters:
     """Parameters of the follower's fine-tuning controller."""
 
-    mode: str = parameter("paper", "How the camera's blocks are used", choices=("paper",))
+    mode: str = parameter("paper", "How the camera's blocks are used", choices=("paper", "precise"))
     first_step_m: float = parameter(
         0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
     )
@@ -42,8 +47,12 @@ class FineTunerParameters:
     max_u_m: float = parameter(
         0.05, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
     )
+    calibration_file: str = parameter(
+        "", "YAML file of 'formation calibrate vision': its values go before those of 'alignment'; empty: none"
+    )
     look: LookParameters = LookParameters()
     alignment: AlignmentParameters = AlignmentParameters()
+    precise: PreciseParameters = PreciseParameters()
 
 
 @dataclass(frozen=True)
@@ -105,6 +114,7 @@ class Phase(Enum):
 
     NEIGHBOUR = auto()
     MOVE = auto()
+    SIGHT = auto()
     LOOK = auto()
     PREDICTION = auto()
     LOST = auto()
@@ -116,9 +126,12 @@ class FineTuner:
     def __init__(self, parameters: FineTunerParameters) -> None:
         self._p = parameters
         self._phase = Phase.NEIGHBOUR
-        self._alignment = PaperAlignment(parameters.alignment)
+        self._alignment = _mode(parameters)
         self._displacement = Motion()
         self._previous = Motion()
+        self._asked = Motion()
+        self._out_of_view = False
+        self._resent = 0
         self._prediction: Motion | None = None
         self._planned_move: Motion | None = None  # the prediction move, until it has ended
         self._actuation_error: Motion | None = None
@@ -154,12 +167,14 @@ class FineTuner:
         if planned is not None:
             self._actuation_error = Motion(motion.x_m - planned.x_m, motion.y_m - planned.y_m)
         self._displacement = self._displacement.then(motion)
+        self._alignment.moved(self._asked, motion)
         return self._look()
 
     def frame(self, blocks: Sequence[Block], stamp_ns: int) -> list[Action]:
         """The camera's blocks of one frame. Only frames later than the last fact count."""
-        if self._phase is not Phase.LOOK or stamp_ns <= self._look_from_ns:
+        if self._phase not in (Phase.LOOK, Phase.SIGHT) or stamp_ns <= self._look_from_ns:
             return []
+        self._resent = 0
         self._frames.append(blocks)
         if len(self._frames) < self._frames_wanted:
             return []
@@ -168,7 +183,20 @@ class FineTuner:
             self._extensions += 1
             self._frames_wanted += self._p.look.extra_frames
             return [RequestFrames(self._p.look.extra_frames)]
-        return self._decide(self._alignment.assess(blocks), blocks)
+        if self._phase is Phase.SIGHT:
+            return self._go(self._alignment.turn_before(self._frames))
+        return self._decide(self._alignment.assess(self._frames))
+
+    def stalled(self) -> list[Action]:
+        """Nothing comes any more: ask again for missing frames; a camera that stays silent loses the leader."""
+        if self._phase not in (Phase.LOOK, Phase.SIGHT):
+            return []
+        self._resent += 1
+        if self._resent > self._p.look.max_requests:
+            self._phase = Phase.LOST
+            return [State("lost"), Warn("the camera gives no frames any more"), Lost()]
+        missing = self._frames_wanted - len(self._frames)
+        return [Warn(f"{missing} frames of a look are missing: asked for again"), RequestFrames(missing)]
 
     def prediction(self, mean: Motion | None) -> list[Action]:
         """The predictor's displacement for the next timestep, answered to this report; None if it has none."""
@@ -185,19 +213,23 @@ class FineTuner:
     def _begin(self) -> list[Action]:
         if self._neighbour < self.timestep:
             return []
-        self._alignment = PaperAlignment(self._p.alignment)
+        self._alignment.restart(self.timestep)
         self._displacement = Motion()
         self._actuation_error = None
         if self.timestep == 0:
             return [State("align"), *self._look()]
-        self._phase = Phase.MOVE
+        return self._look(Phase.SIGHT) if self._alignment.looks_before else self._go(0.0)
+
+    def _go(self, turn_rad: float) -> list[Action]:
+        """Make the prediction move, and turn by what the look before it calls for."""
         wish = self._planned()
         motion = Motion.from_uv(
             max(-self._p.max_u_m, min(self._p.max_u_m, wish.u_m)), max(-self._p.max_v_m, min(self._p.max_v_m, wish.v_m))
         )
         self._planned_move = motion
         collecting = self.timestep <= COLLECTION_TIMESTEPS
-        actions: list[Action] = [State("collect" if collecting else "predict"), SendMove(motion)]
+        move = Motion(motion.x_m, motion.y_m, turn_rad)
+        actions: list[Action] = [State("collect" if collecting else "predict"), *self._move(move)]
         if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
             actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"))
         return actions
@@ -209,8 +241,8 @@ class FineTuner:
             return self._previous
         return self._prediction
 
-    def _look(self) -> list[Action]:
-        self._phase = Phase.LOOK
+    def _look(self, phase: Phase = Phase.LOOK) -> list[Action]:
+        self._phase = phase
         self._frames = []
         self._frames_wanted = self._p.look.frames
         self._extensions = 0
@@ -222,16 +254,21 @@ class FineTuner:
         kinds = [sorted((block.signature, block.index) for block in blocks) for blocks in last]
         return all(kind == kinds[0] for kind in kinds)
 
-    def _decide(self, decision: Decision, blocks: Sequence[Block]) -> list[Action]:
+    def _decide(self, decision: Decision) -> list[Action]:
         if decision.verdict is Verdict.LOST:
             self._phase = Phase.LOST
             return [State("lost"), Lost()]
         if decision.verdict is Verdict.LOOK:
+            self._out_of_view = True
             return [State("hold"), *self._look()]
+        if decision.verdict is Verdict.SEARCH:
+            self._out_of_view = True
+            return [State(f"search: {decision.reason}"), *self._move(decision.motion)]
+        actions: list[Action] = [State("reacquired")] if self._out_of_view else []
+        self._out_of_view = False
         if decision.verdict is Verdict.MOVE:
-            self._phase = Phase.MOVE
-            return [State(f"correct: {decision.reason}"), SendMove(decision.motion)]
-        actions: list[Action] = [State(decision.verdict.value)]
+            return [*actions, State(f"correct: {decision.reason}"), *self._move(decision.motion)]
+        actions.append(State(decision.verdict.value))
         if decision.verdict is Verdict.UNALIGNED:
             actions.append(Warn(decision.reason))
         if self.timestep == 0:
@@ -241,10 +278,21 @@ class FineTuner:
         commanded = None
         if (error := self._actuation_error) is not None:
             commanded = Motion(self._displacement.x_m - error.x_m, self._displacement.y_m - error.y_m)
-        return [*actions, Report(self._displacement, self._alignment.offset(blocks), commanded)]
+        return [*actions, Report(self._displacement, self._alignment.offset(), commanded)]
+
+    def _move(self, motion: Motion) -> list[Action]:
+        self._phase = Phase.MOVE
+        self._asked = motion
+        return [SendMove(motion)]
 
     def _finish(self) -> list[Action]:
         finished = self.timestep
         self.timestep += 1
         self._phase = Phase.NEIGHBOUR
         return [Done(finished), *self._begin()]
+
+
+def _mode(parameters: FineTunerParameters) -> AlignmentMode:
+    if parameters.mode == "paper":
+        return PaperMode(parameters.alignment)
+    return PreciseAlignment(parameters.precise, parameters.first_step_m)

@@ -15,6 +15,7 @@ from robot_formation import names
 from robot_formation.components.catalogue import KINDS, NodeKind
 from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.errors import FormationError
+from robot_formation.experiment.camera_facts import check_camera
 from robot_formation.experiment.drive_curves import check_curves
 from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
 from robot_formation.paths import config_dir
@@ -96,7 +97,7 @@ class Scenario:
         return values
 
     def check(self) -> None:
-        """Check every node's parameters, the surface's and the drives' calibration.
+        """Check every node's parameters, the surface's, and the drives' and the camera's calibrations.
 
         Raises:
             FormationError: naming what is wrong.
@@ -111,6 +112,7 @@ class Scenario:
             )
         from_mapping(KINDS["world"].parameter_class(), world, where="world").check()
         check_curves(self)
+        check_camera(self)
 
     def _world(self) -> dict[str, Any]:
         heading = math.radians(self.setup.heading_deg)

@@ -10,6 +10,7 @@ from typing import Any
 
 from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.components.catalogue import KINDS
+from robot_formation.experiment.camera_facts import camera_values
 from robot_formation.experiment.drive_curves import robot_curves
 from robot_formation.experiment.scenario import Scenario
 
@@ -74,6 +75,7 @@ def run_metadata(scenario: Scenario) -> dict[str, str]:
         "camera": world["camera.mode"],
         "parameters": json.dumps({kind: scenario.parameters(kind) for kind in KINDS}, sort_keys=True),
         "drive_curves": json.dumps(robot_curves(scenario)),
+        "camera_calibration": json.dumps(camera_values(scenario)),
         "versions": json.dumps(versions()),
         "git_commit": git_commit(),
     }

@@ -1,0 +1,157 @@
+"""`formation calibrate vision`: the camera's pictures at places around the neighbour, and the curves that follow."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robot_formation import exit_codes
+from robot_formation.cli.sweep import with_progress
+from robot_formation.errors import FormationError
+
+if TYPE_CHECKING:
+    from robot_formation.analysis.vision_report import VisionResult
+    from robot_formation.control.sightings import Sighting
+    from robot_formation.experiment.scenario import Scenario
+    from robot_formation.experiment.vision_grid import Conditions, Position
+
+DESCRIPTION = """\
+Place the follower's camera at every 5 cm of -45 to 45 cm along u and v around its beacon neighbour and at nine relative
+angles, and look (with two finer sets parallel to the neighbour). Blocks go into a table (vision.csv) and a bag
+(vision_bag). From them: the areas (vision_areas.png), the pan curves (vision_pan.png), the side-length curve
+(vision_side.png), and the fine-tuner's values (vision.yaml). 'formation run --set fine_tuner.calibration_file=FILE'
+uses them. A calibration that was stopped goes on when the same command is given again.
+"""
+CALIBRATION_FILE = "vision.yaml"
+PICTURES = {"areas": "vision_areas.png", "pan": "vision_pan.png", "side": "vision_side.png"}
+_STEP_M = 0.05
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add what only this calibration has."""
+    parser.add_argument(
+        "--step", metavar="M", type=float, default=_STEP_M, help=f"step of the grid, in metres (default: {_STEP_M})"
+    )
+    parser.add_argument("--jobs", metavar="N", type=int, default=os.cpu_count() or 1, help="looks at the same time")
+
+
+def run_vision(args: argparse.Namespace) -> int:
+    """Look, record, fit, store, draw and print; return 0, or 130 when interrupted.
+
+    Raises:
+        FormationError: on anything wrong in the arguments or the folder, or if the curves can't be fitted.
+    """
+    from robot_formation.cli.calibrate import build_scenario, output_folder
+    from robot_formation.experiment.calibration_vision import BAG_NAME, conditions_of, record_of
+    from robot_formation.experiment.vision_grid import positions
+    from robot_formation.experiment.vision_table import RECORD_NAME, TABLE_NAME, VisionTable
+
+    if args.jobs < 1:
+        raise FormationError(f"--jobs is at least 1, not {args.jobs}")
+    scenario = build_scenario(args, with_curves=False)
+    conditions = conditions_of(scenario)
+    places = positions(args.step, conditions.world.chassis.width_m)
+    folder = output_folder(args, scenario)
+    if args.force:
+        _clear(folder, (RECORD_NAME, TABLE_NAME, CALIBRATION_FILE, *PICTURES.values(), BAG_NAME))
+    table = VisionTable(folder, record_of(scenario, args.step), places)
+    try:
+        _look(table, places, conditions, args.jobs)
+        result = _evaluate(scenario, conditions, table.all(places), folder, args.step)
+    except KeyboardInterrupt:
+        print(f"\nformation calibrate: interrupted; the same command goes on in {folder}", file=sys.stderr)
+        return exit_codes.INTERRUPTED
+    _print(args, scenario, result, folder)
+    return exit_codes.DONE
+
+
+def _look(table: Any, places: list[Position], conditions: Conditions, jobs: int) -> None:
+    from robot_formation.experiment.calibration_vision import carry_out
+
+    todo = table.remaining(places)
+    if not todo:
+        return
+    if len(todo) < len(places):
+        done = len(places) - len(todo)
+        print(f"{table.path}: {done} positions are there already, {len(todo)} are left", file=sys.stderr)
+    found = carry_out(todo, conditions, min(jobs, len(todo)))
+    for sightings in with_progress(found, len(todo), "positions"):
+        table.add(sightings)
+
+
+def _evaluate(
+    scenario: Scenario, conditions: Conditions, sightings: list[Sighting], folder: Path, step_m: float
+) -> VisionResult:
+    """Write bag, pictures and calibration; the curves come last because they may not be found."""
+    from robot_formation.analysis.vision_areas_figure import draw_areas
+    from robot_formation.analysis.vision_curve_figures import draw_pan, draw_side
+    from robot_formation.analysis.vision_report import VisionResult
+    from robot_formation.bag.writer import PARTIAL_SUFFIX
+    from robot_formation.control.edge_bias import edge_biases
+    from robot_formation.control.vision_calibration import VisionCalibration, save_vision
+    from robot_formation.control.vision_fit import face_views, fit_camera
+    from robot_formation.experiment.calibration_vision import BAG_NAME, record_of, write_bag
+    from robot_formation.experiment.camera_facts import camera_facts
+    from robot_formation.experiment.vision_grid import true_faces
+
+    bag = folder / BAG_NAME
+    if not bag.exists():
+        shutil.rmtree(bag.with_name(BAG_NAME + PARTIAL_SUFFIX), ignore_errors=True)  # of a run that was stopped
+        metadata = {"calibration": "vision", "conditions": json.dumps(record_of(scenario, step_m))}
+        write_bag(bag, sightings, conditions, metadata)
+    world, told = conditions.world, _told(scenario)
+    edge = world.marker.edge_m
+    body = (world.chassis.length_m, world.chassis.width_m)
+    draw_areas(sightings, body, edge, f"Blocks around the beacon neighbour · {told}", folder / PICTURES["areas"])
+    views = face_views(sightings)
+    edges = edge_biases((sighting, true_faces(world, sighting)) for sighting in sightings if sighting.blocks)
+    result = VisionResult(sightings, views, fit_camera(views, edge), edges)
+    measured_with = {"seed": scenario.setup.seed, "surface": world.surface, "step_m": step_m, **camera_facts(scenario)}
+    save_vision(folder / CALIBRATION_FILE, VisionCalibration(result.fit.alignment(), measured_with))
+    distances, compared = result.distances()
+    draw_pan(result.fit, views, distances, compared, f"Pan curves · {told}", folder / PICTURES["pan"])
+    tolerance = scenario.parameters("fine_tuner")["alignment.u_tolerance_m"]
+    draw_side(result.fit, views, tolerance, f"Side length beside the neighbour · {told}", folder / PICTURES["side"])
+    return result
+
+
+def _print(args: argparse.Namespace, scenario: Scenario, result: VisionResult, folder: Path) -> None:
+    from robot_formation.analysis.vision_report import vision_json, vision_text
+    from robot_formation.experiment.calibration_vision import BAG_NAME
+    from robot_formation.experiment.vision_table import TABLE_NAME
+
+    files = {"table": folder / TABLE_NAME, "bag": folder / BAG_NAME, "file": folder / CALIBRATION_FILE}
+    pictures = {name: str(folder / picture) for name, picture in PICTURES.items()}
+    if args.json:
+        said = {
+            "scenario": scenario.setup.name,
+            "seed": scenario.setup.seed,
+            "surface": scenario.parameters("world")["surface"],
+            "step_m": args.step,
+            **{name: str(path) for name, path in files.items()},
+            "pictures": pictures,
+        }
+        print(json.dumps({**said, **vision_json(result)}, indent=2, allow_nan=False))
+        return
+    print(f"camera calibration: {_told(scenario)}\n\n{vision_text(result)}\n")
+    print(f"table: {files['table']}\nbag: {files['bag']}\npictures: {', '.join(pictures.values())}")
+    print(f"calibration: {files['file']}")
+    print(f"to use it: formation run --set fine_tuner.calibration_file={files['file']}")
+
+
+def _clear(folder: Path, names: tuple[str, ...]) -> None:
+    for name in names:
+        path = folder / name
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _told(scenario: Scenario) -> str:
+    return f"seed {scenario.setup.seed}, {scenario.parameters('world')['surface']}"

@@ -1,0 +1,188 @@
+"""`mode: precise`: corrections from an estimate of the neighbour's pose, which lasts over all looks and moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from robot_formation.control.alignment import TARGET, Box, Decision, Verdict
+from robot_formation.control.alignment_modes import Frames
+from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, way_to
+from robot_formation.control.drive_experience import DriveExperience
+from robot_formation.control.leader_search import LeaderSearch, SearchParameters
+from robot_formation.control.marker_view import EdgeParameters, mean_boxes
+from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.control.pose_filter import FilterParameters, PoseFilter
+from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y
+from robot_formation.parameters import parameter
+
+_SURPRISE = 12.0
+"""Mean square of a look's innovations by their scatter from which on something is in the way."""
+_VANTAGES_M = (0.14, 0.11, -0.11, -0.14, -0.125, 0.125, 0.15, -0.15)
+_VANTAGE_BESIDE_M = 0.33
+_LAST_MOVES = 5
+_CLUELESS_RAD = 0.08
+_ASIDE_RAD = 0.25
+
+
+@dataclass(frozen=True)
+class PreciseParameters:
+    """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
+
+    u_tolerance_m: float = parameter(0.007, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
+    v_tolerance_m: float = parameter(0.006, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    heading_tolerance_rad: float = parameter(
+        math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
+    )
+    turn_rad: float = parameter(
+        math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
+    )
+    certain_rad: float = parameter(
+        math.radians(0.6),
+        "Standard deviation of the heading that ends the first alignment",
+        unit="rad",
+        low=1e-3,
+        high=1.0,
+    )
+    placed_heading_rad: float = parameter(
+        math.radians(1.0),
+        "Standard deviation of the heading of a follower that was placed in formation by hand",
+        unit="rad",
+        low=1e-4,
+        high=1.0,
+    )
+    placed_m: float = parameter(
+        0.02, "Offset up to which a follower counts as placed in formation", unit="m", low=0.0, high=0.2
+    )
+    averaged_frames: int = parameter(10, "Last frames of a look that are averaged", low=1, high=600)
+    max_moves: int = parameter(
+        14, "Corrections per timestep after which the follower goes on unaligned", low=1, high=1000
+    )
+    geometry: GeometryParameters = GeometryParameters()
+    edges: EdgeParameters = EdgeParameters()
+    filter: FilterParameters = FilterParameters()
+    approach: ApproachParameters = ApproachParameters()
+    search: SearchParameters = SearchParameters()
+
+
+class PreciseAlignment:
+    """Keeps the estimate over the timesteps; one decision a look."""
+
+    looks_before = True
+
+    def __init__(self, parameters: PreciseParameters, first_step_m: float) -> None:
+        self._p = parameters
+        self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
+        self._approach = Approach(parameters.approach)
+        self._experience = DriveExperience()
+        self._search = LeaderSearch(parameters.search)
+        self._step_m = first_step_m
+        self._moves = 0
+        self._timestep = 0
+        self._last = Motion()
+        self._vantages: list[float] = []
+
+    def restart(self, timestep: int) -> None:
+        """Begin a timestep: the neighbour has made its step."""
+        self._moves = 0
+        self._timestep = timestep
+        self._last = Motion()
+        if timestep > 0:
+            self._filter.neighbour_stepped(Motion(self._step_m, self._experience.slip * self._step_m))
+
+    def turn_before(self, frames: Frames) -> float:
+        """Look before the prediction move; returns the turn [rad] that goes with it."""
+        boxes = self._boxes(frames)
+        if not self._filter.known:
+            return 0.0
+        if TARGET in boxes and self._filter.surprise(boxes) < _SURPRISE:
+            self._filter.look(boxes)
+        heading = way_to(self._filter.best.state, FORMATION).yaw_rad
+        return heading if abs(heading) > self._p.turn_rad else 0.0
+
+    def moved(self, asked: Motion, motion: Motion) -> None:
+        """Take a measured move."""
+        self._filter.moved(motion)
+        self._experience.moved(asked, motion)
+        self._last = motion
+
+    def offset(self) -> Motion | None:
+        """Estimate the way to the formation position in the follower's frame."""
+        return way_to(self._filter.best.state, FORMATION) if self._filter.known else None
+
+    def assess(self, frames: Frames) -> Decision:
+        """Decide what the last look calls for."""
+        boxes = self._boxes(frames)
+        strange = self._filter.known and self._filter.surprise(boxes) >= _SURPRISE
+        if strange and self._search.looks >= self._p.search.hold_looks:
+            # What doesn't fit for so long is not in the way: the neighbour, or the follower, was moved.
+            self._filter.forget()
+            strange = False
+        if not boxes or strange:
+            return self._search.missed(self._last if self._moves else Motion(), self.offset())
+        self._search.found()
+        first = not self._filter.known
+        self._filter.look(boxes)
+        if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
+            self._filter.assume_heading(self._p.placed_heading_rad)
+        return self._correct()
+
+    def _correct(self) -> Decision:
+        p, state = self._p, self._filter.best.state
+        unsure = self._filter.yaw_sigma_rad > p.certain_rad
+        searching = unsure and self._timestep == 0 and self._moves < p.max_moves - _LAST_MOVES
+        if not searching and self._within(way_to(state, FORMATION)):
+            return Decision(Verdict.ALIGNED, reason="inside the tolerances")
+        if self._moves >= p.max_moves:
+            return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
+        motion, reason = self._next(state, searching)
+        if motion == Motion():
+            return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
+        self._moves += 1
+        return Decision(Verdict.MOVE, self._experience.compensated(motion), reason)
+
+    def _next(self, state: Vector, searching: bool) -> tuple[Motion, str]:
+        """Choose the next motion and say why."""
+        states = self._filter.likely()
+        if self._filter.yaw_sigma_rad > _CLUELESS_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
+            return self._approach.face(states), "turn towards the marker"
+        if searching:
+            return self._without_trifles(self._approach.next(states, self._vantage(state))), "to see two faces"
+        return self._without_trifles(self._approach.next(states, FORMATION)), "to the formation position"
+
+    def _boxes(self, frames: Frames) -> dict[int, Box]:
+        last = frames[-self._p.averaged_frames :]
+        return mean_boxes([self._filter.plausible(blocks) for blocks in last] if self._filter.known else last)
+
+    def _placed(self, state: Vector) -> bool:
+        return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m
+
+    def _within(self, way: Motion) -> bool:
+        p = self._p
+        return (
+            abs(way.y_m) <= p.u_tolerance_m
+            and abs(way.x_m) <= p.v_tolerance_m
+            and abs(way.yaw_rad) <= p.heading_tolerance_rad
+        )
+
+    def _without_trifles(self, motion: Motion) -> Motion:
+        """Leave out legs that are hardly worth a move."""
+        p = self._p
+        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        x, y = c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m
+        yaw = motion.yaw_rad if abs(motion.yaw_rad) > 0.4 * p.heading_tolerance_rad else 0.0
+        x = x if abs(x) > 0.5 * p.v_tolerance_m else 0.0
+        y = y if abs(y) > 0.5 * p.u_tolerance_m else 0.0
+        c, s = math.cos(yaw), math.sin(yaw)
+        return Motion(c * x - s * y, s * x + c * y, yaw)
+
+    def _vantage(self, state: Vector) -> Motion:
+        """A place behind or ahead from where a second face shows: twice on the near side, then on the other.
+
+        The outer edges of Front and Rear are biased alike, so that the two sides' errors in heading cancel.
+        """
+        if not self._vantages:
+            behind = way_to(state, Motion()).x_m > 0.0
+            self._vantages = [-place if behind else place for place in _VANTAGES_M]
+        place = self._vantages.pop(0)
+        return Motion(place, -_VANTAGE_BESIDE_M, 0.0)

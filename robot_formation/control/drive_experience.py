@@ -1,0 +1,66 @@
+"""What a follower learns of its own drive from its moves: how short corrections fall, and how it slips aside."""
+
+from __future__ import annotations
+
+import math
+
+from robot_formation.control.motion import Motion
+
+_LEAST_DRIVE_M = 0.02
+_SLIP_GAIN = 0.3
+_LEAST_LEG_M = 0.0022
+_LONGEST_BESIDE_M = 0.01
+_SHORT_DRIVE_M = 0.06
+_MOST_SHORT_M = 0.006
+_SHORT_GAIN = 0.5
+
+
+class DriveExperience:
+    """Running means over the latest moves.
+
+    Attributes:
+        slip: way aside (to the left) per way ahead, where none was asked for.
+    """
+
+    def __init__(self) -> None:
+        self.slip = 0.0
+        self._wanted: Motion | None = None
+        self._short: dict[tuple[str, bool], float] = {}
+
+    def compensated(self, motion: Motion) -> Motion:
+        """Ask for as much more as corrections of this axis and direction have lately fallen short by."""
+        self._wanted = motion
+        x, y = _after_turn(motion, motion.yaw_rad)
+        x, y = self._longer("v", x), self._longer("u", y)
+        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        return Motion(c * x - s * y, s * x + c * y, motion.yaw_rad)
+
+    def moved(self, asked: Motion, motion: Motion) -> None:
+        """Take a move as it was asked for and as it was measured."""
+        sent, got = _after_turn(asked, asked.yaw_rad), _after_turn(motion, asked.yaw_rad)
+        if self._wanted is not None:
+            for axis, want, a, b in zip("vu", _after_turn(self._wanted, asked.yaw_rad), sent, got, strict=True):
+                self._learn(axis, want, (a - b) * math.copysign(1.0, want))
+            self._wanted = None
+        if sent[0] > _LEAST_DRIVE_M and got[0] > _LEAST_DRIVE_M:
+            # A leg shorter than the robot's coasting is not driven at all.
+            driven = sent[1] if abs(sent[1]) > _LEAST_LEG_M else 0.0
+            if abs(driven) < _LONGEST_BESIDE_M:
+                self.slip += _SLIP_GAIN * ((got[1] - driven) / got[0] - self.slip)
+
+    def _longer(self, axis: str, length: float) -> float:
+        if not 0.0 < abs(length) < _SHORT_DRIVE_M:
+            return length
+        return length + math.copysign(self._short.get((axis, length > 0.0), 0.0), length)
+
+    def _learn(self, axis: str, want: float, missing: float) -> None:
+        if 0.0 < abs(want) < _SHORT_DRIVE_M:
+            known = self._short.get((axis, want > 0.0), 0.0)
+            mean = known + _SHORT_GAIN * (missing - known)
+            self._short[axis, want > 0.0] = max(0.0, min(_MOST_SHORT_M, mean))
+
+
+def _after_turn(motion: Motion, turn_rad: float) -> tuple[float, float]:
+    """Components ahead and to the left in the frame that the turn leads to: the drive's legs."""
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    return c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m

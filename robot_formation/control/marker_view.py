@@ -1,0 +1,146 @@
+"""A look at the marker as sub-pixel edges: blocks of several frames put together, the detector's own bias taken out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from robot_formation.control.alignment import FRONT, REAR, TARGET, Box, hulls
+from robot_formation.parameters import parameter
+from robot_formation.vision.block import Block
+
+PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX = 316.0, 208.0
+_CUT = 6.0
+_MARGIN_PX = 5.0
+"""An edge nearer to the picture's border may be the border's, not the marker's."""
+
+
+@dataclass(frozen=True)
+class EdgeParameters:
+    """What the detector reports more than the true edge, and how that scatters; measured with `calibrate vision`."""
+
+    target_left_px: float = parameter(2.0, "Bias of the Target block's left edge", unit="px", low=-20.0, high=20.0)
+    target_right_px: float = parameter(
+        0.1, "Bias of its right edge where no Front block follows", unit="px", low=-20.0, high=20.0
+    )
+    target_top_px: float = parameter(1.25, "Bias of its upper edge", unit="px", low=-20.0, high=20.0)
+    target_bottom_px: float = parameter(-1.15, "Bias of its lower edge", unit="px", low=-20.0, high=20.0)
+    front_left_px: float = parameter(2.3, "Bias of the Front block's left edge", unit="px", low=-20.0, high=20.0)
+    front_right_px: float = parameter(-0.5, "Bias of its right edge", unit="px", low=-20.0, high=20.0)
+    narrow_right_px: float = parameter(
+        -2.7, "Bias of the right edge of a narrow Front block", unit="px", low=-20.0, high=20.0
+    )
+    narrow_px: float = parameter(10.0, "Reported width below which a block is narrow", unit="px", low=0.0, high=100.0)
+    rear_left_px: float = parameter(3.05, "Bias of the Rear block's left edge", unit="px", low=-20.0, high=20.0)
+    rear_right_px: float = parameter(
+        0.1, "Bias of its right edge where no Target block follows", unit="px", low=-20.0, high=20.0
+    )
+    column_sigma_px: float = parameter(0.7, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
+    far_column_sigma_px: float = parameter(
+        1.3, "Scatter of the outer edges of Front and Rear", unit="px", low=0.01, high=20.0
+    )
+    sliver_sigma_px: float = parameter(
+        2.5,
+        "Scatter of the Target block's right edge beside a Front face too narrow to be reported",
+        unit="px",
+        low=0.01,
+        high=50.0,
+    )
+    row_sigma_px: float = parameter(0.45, "Scatter of upper and lower edges", unit="px", low=0.01, high=20.0)
+    front_shows_px: float = parameter(
+        9.0, "Width from which on the Front face is always reported", unit="px", low=1.0, high=100.0
+    )
+    rear_shows_px: float = parameter(
+        15.0, "Width from which on the Rear face is always reported", unit="px", low=1.0, high=100.0
+    )
+    hidden_sigma_px: float = parameter(1.5, "How sharp these bounds are", unit="px", low=0.01, high=20.0)
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One measured edge: face (signature), side, position [px] and its standard deviation [px].
+
+    The side "width" means a face that isn't reported: it can't be wider than this.
+    """
+
+    face: int
+    side: str
+    position_px: float
+    sigma_px: float
+
+
+@dataclass(frozen=True)
+class View:
+    """The edges of a look, and which faces were reported."""
+
+    edges: tuple[Edge, ...]
+    faces: frozenset[int]
+
+
+def mean_boxes(frames: Sequence[Sequence[Block]]) -> dict[int, Box]:
+    """Average each face's box over the frames that report the faces which the last frame reports."""
+    last = set(hulls(frames[-1])) if frames else set()
+    groups = [boxes for boxes in map(hulls, frames) if set(boxes) == last]
+    return {face: _mean([boxes[face] for boxes in groups]) for face in sorted(last)}
+
+
+def _mean(boxes: Sequence[Box]) -> Box:
+    count = len(boxes)
+    return Box(
+        sum(box.left for box in boxes) / count,
+        sum(box.right for box in boxes) / count,
+        sum(box.top for box in boxes) / count,
+        sum(box.bottom for box in boxes) / count,
+    )
+
+
+def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
+    """Take the edges that can be trusted out of a look's boxes.
+
+    Where two faces meet, the one on the right tells the common edge: the detector's rows are exact there only. Front
+    and Rear give columns only beside a Target block: their slivers are often broken up in height.
+    """
+    edges: list[Edge] = []
+    near, far = p.column_sigma_px, p.far_column_sigma_px
+    target, front, rear = boxes.get(TARGET), boxes.get(FRONT), boxes.get(REAR)
+    if target is not None:
+        # The detector begins a row's earlier segments one cell late.
+        late, sigma = (0.5, 1.6 * near) if front is not None else (0.0, near)
+        edges.append(Edge(TARGET, "left", target.left - p.target_left_px - late, sigma))
+        if front is None:
+            edges.append(Edge(TARGET, "right", target.right - p.target_right_px, near))
+        edges += _rows(TARGET, target, p, 1.0)
+    if front is not None:
+        edges.append(Edge(FRONT, "left", front.left - p.front_left_px, near))
+        narrow = front.width < p.narrow_px
+        bias = p.narrow_right_px if narrow else p.front_right_px
+        edges.append(Edge(FRONT, "right", front.right - bias, 1.5 * far if narrow else far))
+        edges += _rows(FRONT, front, p, 2.0) if target is None else []
+    if rear is not None:
+        edges.append(Edge(REAR, "left", rear.left - p.rear_left_px, far))
+        if target is None:
+            edges.append(Edge(REAR, "right", rear.right - p.rear_right_px, far))
+            edges += _rows(REAR, rear, p, 2.0)
+    return View(tuple(edge for edge in edges if _inside(edge)), frozenset(boxes))
+
+
+def hidden(view: View, p: EdgeParameters) -> Iterable[Edge]:
+    """List bounds on the widths of faces that the look does not report."""
+    for face, width in ((FRONT, p.front_shows_px), (REAR, p.rear_shows_px), (TARGET, p.front_shows_px)):
+        if face not in view.faces:
+            yield Edge(face, "width", width, p.hidden_sigma_px)
+
+
+def _rows(face: int, box: Box, p: EdgeParameters, scale: float) -> Iterable[Edge]:
+    # Of a face that the picture cuts off, the hidden part may reach higher.
+    cut = box.left < _MARGIN_PX or box.right > PICTURE_WIDTH_PX - 1.0 - _MARGIN_PX
+    sigma = scale * p.row_sigma_px * (_CUT if cut else 1.0)
+    return (
+        Edge(face, "top", box.top - p.target_top_px, sigma),
+        Edge(face, "bottom", box.bottom - p.target_bottom_px, sigma),
+    )
+
+
+def _inside(edge: Edge) -> bool:
+    size = PICTURE_WIDTH_PX if edge.side in ("left", "right") else PICTURE_HEIGHT_PX
+    return _MARGIN_PX < edge.position_px < size - _MARGIN_PX

@@ -1,0 +1,323 @@
+"""Estimate of the neighbour's pose from looks and known moves: a bank of iterated extended Kalman filters.
+
+Bearing and distance follow from one look; the heading only from how the picture changes over known moves, and from
+the faces beside the Target face. Until looks have decided, several headings are kept side by side (Gaussian sum
+filter: Sorenson and Alspach, Automatica 7, 1971; iterated update: Bell and Cathey, IEEE TAC 38, 1993).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
+from robot_formation.control.marker_view import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, view
+from robot_formation.control.motion import Motion
+from robot_formation.control.relative_pose import (
+    CURVATURE,
+    SIZE,
+    TWIST,
+    YAW,
+    MarkerModel,
+    Matrix,
+    Vector,
+    X,
+    Y,
+    after_motion,
+)
+from robot_formation.parameters import parameter
+from robot_formation.vision.block import Block
+
+_ITERATIONS = 6
+_KEPT_COST = 16.0
+_LIKELY_COST = 16.0
+_GATE_PX = 15.0
+_HYPOTHESES = 14
+FACES = (TARGET, FRONT, REAR)
+
+
+@dataclass(frozen=True)
+class FilterParameters:
+    """How far the filter trusts moves, the ground and what it saw before."""
+
+    curvature_sigma_per_m: float = parameter(
+        0.15, "Curvature of the ground between the robots", unit="1/m", low=1e-4, high=10.0
+    )
+    curvature_drift_per_m: float = parameter(
+        0.005, "Change of that curvature with each step of the neighbour", unit="1/m", low=0.0, high=10.0
+    )
+    twist_sigma_rad: float = parameter(
+        0.006, "Relative pitch that the curvature doesn't account for", unit="rad", low=1e-4, high=0.5
+    )
+    move_sigma: float = parameter(0.02, "Error of a measured move, share of its length", low=0.0, high=1.0)
+    move_floor_m: float = parameter(0.0007, "Error of a measured move, least", unit="m", low=0.0, high=0.1)
+    turn_sigma: float = parameter(0.03, "Error of a measured turn, share of it", low=0.0, high=1.0)
+    yaw_drift_rad: float = parameter(
+        0.0022,
+        "Turn by slip on a move of 10 cm, which the wheels don't measure; grows with the root of the way",
+        unit="rad",
+        low=0.0,
+        high=1.0,
+    )
+    neighbour_step_sigma_m: float = parameter(
+        0.02, "How far the neighbour's step may differ from the last one", unit="m", low=0.0, high=1.0
+    )
+    neighbour_sidestep_sigma_m: float = parameter(
+        0.0007, "How far the neighbour's step leads aside from its heading", unit="m", low=0.0, high=1.0
+    )
+    slip_per_lean: float = parameter(
+        1.0,
+        "Sideways slip of a driving robot: share of its way per radian of lateral slope",
+        unit="1/rad",
+        low=0.0,
+        high=100.0,
+    )
+    neighbour_turn_sigma_rad: float = parameter(
+        0.002, "How far the neighbour turns by slip in its step", unit="rad", low=0.0, high=1.0
+    )
+
+
+@dataclass
+class Hypothesis:
+    """State (5,) and covariance (5, 5) as in `relative_pose`, and twice the negative log likelihood of all looks."""
+
+    state: Vector
+    covariance: Matrix
+    cost: float = 0.0
+
+
+class PoseFilter:
+    """Where the neighbour stands, as far as looks and moves tell."""
+
+    def __init__(self, model: MarkerModel, edges: EdgeParameters, parameters: FilterParameters) -> None:
+        self._model = model
+        self._edges = edges
+        self._p = parameters
+        self.hypotheses: list[Hypothesis] = []
+
+    @property
+    def known(self) -> bool:
+        """Whether there is any estimate."""
+        return bool(self.hypotheses)
+
+    @property
+    def best(self) -> Hypothesis:
+        """The likeliest hypothesis; only if there is one."""
+        return self.hypotheses[0]
+
+    @property
+    def yaw_sigma_rad(self) -> float:
+        """Standard deviation of the heading over all hypotheses."""
+        weights = np.array([math.exp(-0.5 * (h.cost - self.best.cost)) for h in self.hypotheses])
+        weights /= weights.sum()
+        yaws = np.array([h.state[YAW] for h in self.hypotheses])
+        inside = np.array([h.covariance[YAW, YAW] for h in self.hypotheses])
+        mean = float(weights @ yaws)
+        return math.sqrt(float(weights @ (inside + (yaws - mean) ** 2)))
+
+    def likely(self) -> list[Vector]:
+        """List the states that looks have not yet ruled out, the likeliest first."""
+        return [h.state for h in self.hypotheses if h.cost <= self.best.cost + _LIKELY_COST]
+
+    def forget(self) -> None:
+        """Drop everything."""
+        self.hypotheses = []
+
+    def assume_heading(self, sigma_rad: float) -> None:
+        """Take for known that the neighbour heads as the follower does, up to a standard deviation."""
+        row = np.zeros((1, SIZE))
+        row[0, YAW] = 1.0
+        for hypothesis in self.hypotheses:
+            innovation = -hypothesis.state[YAW]
+            cost = _gain_update(hypothesis, row, np.array([innovation]), np.array([sigma_rad**2]))
+            hypothesis.cost += cost
+        self._prune()
+
+    # --- moves ------------------------------------------------------------------------------------------------------
+
+    def moved(self, motion: Motion) -> None:
+        """Take a move of the follower as its encoders measured it."""
+        p = self._p
+        length = math.hypot(motion.x_m, motion.y_m)
+        # The turn comes first: its error swings the way that follows.
+        yaw = (p.turn_sigma * motion.yaw_rad) ** 2 + p.yaw_drift_rad**2 * length / 0.1
+        place = p.move_floor_m**2 + (p.move_sigma * length) ** 2 + (0.02 * motion.yaw_rad) ** 2
+        noise = np.diag([place, place, yaw, 0.0, 0.0])
+        for hypothesis in self.hypotheses:
+            self._propagate(hypothesis, motion, noise)
+
+    def _propagate(self, hypothesis: Hypothesis, motion: Motion, noise: Matrix) -> None:
+        state = hypothesis.state
+        jacobian = np.eye(SIZE)
+        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        turn = np.array([[c, s], [-s, c]])
+        jacobian[:2, :2] = turn
+        moved = after_motion(state, motion)
+        # A turn that was not measured moves the neighbour about the follower.
+        swing = np.eye(SIZE)
+        swing[X, YAW], swing[Y, YAW] = -moved[Y], moved[X]
+        hypothesis.state = moved
+        hypothesis.covariance = jacobian @ hypothesis.covariance @ jacobian.T + swing @ noise @ swing.T
+
+    def neighbour_stepped(self, step: Motion) -> None:
+        """Take that the neighbour has made a step of about this size in its own frame."""
+        p = self._p
+        for hypothesis in self.hypotheses:
+            state, covariance = hypothesis.state, hypothesis.covariance
+            c, s = math.cos(state[YAW]), math.sin(state[YAW])
+            along = np.array([[c, -s], [s, c]])
+            # The neighbour slips as the follower does, and by as much more as it leans more.
+            aside = step.y_m - p.slip_per_lean * state[CURVATURE] * state[Y] * abs(step.x_m)
+            jacobian = np.eye(SIZE)
+            jacobian[:2, YAW] = along @ (-aside, step.x_m)
+            hypothesis.state = state.copy()
+            hypothesis.state[:2] += along @ (step.x_m, aside)
+            noise = np.zeros((SIZE, SIZE))
+            noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, p.neighbour_sidestep_sigma_m**2]) @ along.T
+            noise[YAW, YAW] = p.neighbour_turn_sigma_rad**2
+            noise[CURVATURE, CURVATURE] = p.curvature_drift_per_m**2
+            noise[TWIST, TWIST] = (0.2 * p.twist_sigma_rad) ** 2
+            hypothesis.covariance = jacobian @ covariance @ jacobian.T + noise
+
+    # --- looks ------------------------------------------------------------------------------------------------------
+
+    def look(self, boxes: dict[int, Box]) -> None:
+        """Take a look's boxes, at least one."""
+        seen = view(boxes, self._edges)
+        if not self.hypotheses:
+            self._begin(boxes)
+        for hypothesis in self.hypotheses:
+            self._update(hypothesis, seen)
+        self._prune()
+        if not self.hypotheses:
+            self._begin(boxes)
+
+    def plausible(self, blocks: Sequence[Block]) -> list[Block]:
+        """Leave out blocks that lie where no hypothesis expects their face: distractors of the same colour."""
+        kept = []
+        for block in blocks:
+            if any(self._expects(hypothesis, block) for hypothesis in self.hypotheses):
+                kept.append(block)
+        return kept
+
+    def _expects(self, hypothesis: Hypothesis, block: Block) -> bool:
+        if block.signature not in FACES:
+            return False
+        corners = self._model.pixels(hypothesis.state[None])[0]
+        spread = 3.0 * math.sqrt(float(np.trace(hypothesis.covariance[:2, :2]))) + 0.5 * math.sqrt(
+            float(hypothesis.covariance[YAW, YAW])
+        )
+        gate = _GATE_PX + self._model.parameters.focal_length_px * spread / max(0.1, float(hypothesis.state[Y]))
+        low, high = corners.min(axis=0) - gate, corners.max(axis=0) + gate
+        return bool(low[0] <= block.x <= high[0] and low[1] <= block.y <= high[1])
+
+    def surprise(self, boxes: dict[int, Box]) -> float:
+        """Tell how badly a look fits: squared innovation by its expected scatter, per edge."""
+        seen = view(boxes, self._edges)
+        if not seen.edges:
+            return 0.0
+        costs = []
+        for hypothesis in self.hypotheses:
+            h, predicted = self._linearise(hypothesis.state, seen.edges)
+            innovation = np.array([edge.position_px for edge in seen.edges]) - predicted
+            scatter = h @ hypothesis.covariance @ h.T + np.diag([4.0 * edge.sigma_px**2 for edge in seen.edges])
+            costs.append(float(innovation @ np.linalg.solve(scatter, innovation)) / len(seen.edges))
+        return min(costs)
+
+    def _begin(self, boxes: dict[int, Box]) -> None:
+        face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
+        box = boxes[face]
+        for degrees in range(-90, 91, 10):
+            guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
+            ground = [self._p.curvature_sigma_per_m**2, self._p.twist_sigma_rad**2]
+            covariance = np.diag([0.1**2, 0.1**2, math.radians(12.0) ** 2, *ground])
+            self.hypotheses.append(Hypothesis(guess, covariance))
+
+    def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:
+        steps = np.diag([1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
+        found = self._model.edges(np.concatenate([state[None], state + steps, state - steps]), edges)
+        return ((found[1 : SIZE + 1] - found[SIZE + 1 :]) / 2e-4).T, found[0]
+
+    def _update(self, hypothesis: Hypothesis, seen: View) -> None:
+        """Iterated extended Kalman update; the cost is that of the posterior's residuals and of the way to it."""
+        edges = [*self._trusted(hypothesis.state, seen), *self._exceeded(hypothesis.state, seen)]
+        if not edges:
+            return
+        measured = np.array([edge.position_px for edge in edges])
+        noise = np.diag([edge.sigma_px**2 for edge in edges])
+        prior, covariance = hypothesis.state, hypothesis.covariance
+        state = prior
+        for _ in range(_ITERATIONS):
+            h, predicted = self._linearise(state, edges)
+            scatter = h @ covariance @ h.T + noise
+            gain = np.linalg.solve(scatter, h @ covariance).T
+            change = prior + gain @ (measured - predicted - h @ (prior - state)) - state
+            change[YAW] = max(-0.3, min(0.3, change[YAW]))
+            state = state + change
+            if float(np.abs(change).max()) < 1e-5:
+                break
+        h, predicted = self._linearise(state, edges)
+        kept = np.eye(SIZE) - gain @ h
+        hypothesis.covariance = kept @ covariance @ kept.T + gain @ noise @ gain.T
+        hypothesis.state = state
+        residual, way = measured - predicted, state - prior
+        hypothesis.cost += float(residual @ (residual / np.diag(noise)) + way @ np.linalg.solve(covariance, way))
+        hypothesis.cost += float(np.linalg.slogdet(scatter)[1])
+        hypothesis.cost += self._contradiction(state, seen)
+
+    def _trusted(self, state: Vector, seen: View) -> list[Edge]:
+        """List the edges; a sliver of the Front face may shift the Target block's right one."""
+        sliver = FRONT not in seen.faces and self._model.widths(state)[FRONT] > 0.0
+        sigma = self._edges.sliver_sigma_px
+        return [
+            replace(edge, sigma_px=sigma) if sliver and (edge.face, edge.side) == (TARGET, "right") else edge
+            for edge in seen.edges
+        ]
+
+    def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
+        """List the bounds on faces that were not reported which a state breaks."""
+        widths, columns = self._model.widths(state), self._model.pixels(state[None])[0, :, 0]
+        if columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX:
+            return []  # it may be beyond the picture's edge
+        return [edge for edge in hidden(seen, self._edges) if widths[edge.face] > edge.position_px]
+
+    def _contradiction(self, state: Vector, seen: View) -> float:
+        """Charge faces that were reported and should not have been, or the other way round."""
+        widths = self._model.widths(state)
+        cost = sum(max(0.0, 1.0 - widths[face]) ** 2 / 4.0 for face in seen.faces)
+        for edge in self._exceeded(state, seen):
+            cost += ((widths[edge.face] - edge.position_px) / edge.sigma_px) ** 2
+        return cost
+
+    def _prune(self) -> None:
+        """Keep the likely hypotheses, one of each kind, the best first."""
+        kept: list[Hypothesis] = []
+        self.hypotheses = [h for h in self.hypotheses if math.isfinite(h.cost) and _sane(h)]
+        for hypothesis in sorted(self.hypotheses, key=lambda h: h.cost):
+            if hypothesis.cost > self._least() + _KEPT_COST:
+                continue
+            if all(abs(hypothesis.state[YAW] - other.state[YAW]) > math.radians(3.0) for other in kept):
+                kept.append(hypothesis)
+        self.hypotheses = kept[:_HYPOTHESES]
+
+    def _least(self) -> float:
+        return min(h.cost for h in self.hypotheses)
+
+
+def _sane(hypothesis: Hypothesis) -> bool:
+    """Whether a hypothesis is about a neighbour that could be in view."""
+    state = hypothesis.state
+    return bool(np.isfinite(state).all()) and math.hypot(state[X], state[Y]) < 2.0 and abs(state[YAW]) < 2.0
+
+
+def _gain_update(hypothesis: Hypothesis, h: Matrix, innovation: Vector, variance: Vector) -> float:
+    """Kalman update in place; returns its cost."""
+    covariance = hypothesis.covariance
+    scatter = h @ covariance @ h.T + np.diag(variance)
+    gain = np.linalg.solve(scatter, h @ covariance).T
+    hypothesis.state = hypothesis.state + gain @ innovation
+    hypothesis.covariance = covariance - gain @ h @ covariance
+    return float(innovation @ np.linalg.solve(scatter, innovation))
