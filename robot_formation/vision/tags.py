@@ -95,8 +95,9 @@ class TagDetector:
 
     def configure(self, parameters: TagParameters, tracking: DetectorParameters) -> None:
         """Change the parameters; tracked blocks are kept."""
+        known = dictionary()
         self._enlargement = parameters.enlargement
-        self._search = cv2.aruco.ArucoDetector(dictionary(), _opencv(parameters))
+        self._search = cv2.aruco.ArucoDetector(known, _opencv(parameters))
         self._tracker.configure(tracking.block_filtering, tracking.max_tracking_velocity)
 
     def reset(self) -> None:
@@ -144,7 +145,7 @@ class TagDetector:
 
 
 def _opencv(parameters: TagParameters) -> Any:
-    """Translate into OpenCV's parameters. Its corners are exact to 0.3 px as found: refining them makes them worse."""
+    """Translate into OpenCV's parameters. Refining its corners would make a box's edges worse, not better."""
     p, found = parameters, cv2.aruco.DetectorParameters()
     found.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_NONE
     # OpenCV measures outlines by the picture's longer side, and both grow alike.
