@@ -211,16 +211,16 @@ def runs(chosen, predictor, jobs):
     cases = list(itertools.product(("one", "two"), ("paper", "precise"), KINDS))
     results = Parallel(n_jobs=jobs)(delayed(one_run)(*case, predictor, seed) for case in cases for seed in chosen)
     print(f"\npredictor {predictor}, {len(chosen)} seeds\n")
-    print(
-        "| track | mode | marker | not finished | formation error (cm) | heading error (deg) | correction (cm) | ",
-        end="",
-    )
-    print("moves per timestep | out of view (found again) |\n|---|---|---|---|---|---|---|---|---|")
+    print("| track | mode | marker | not finished | formation error (cm) | tags against colours | ", end="")
+    print("heading error (deg) | correction (cm) | moves per timestep | out of view (found again) |")
+    print("|" + "---|" * 10)
+    stories, before = [], []
     for number, (track, mode, kind) in enumerate(cases):
         mine = results[number * len(chosen) : (number + 1) * len(chosen)]
         lost = sum(outcome != "done" for outcome, _ in mine)
         cells = [
             median_of(mine, "formation_error_rmse_m", 100.0),
+            "-" if kind == "colours" else ratios(mine, before),
             median_of(mine, "heading_error_rmse_rad", math.degrees(1.0)),
             median_of(mine, "correction_m", 100.0),
             median_of(mine, "movements_per_timestep", 1.0),
@@ -228,14 +228,32 @@ def runs(chosen, predictor, jobs):
         away = sum(len(totals["losses"]) for _, totals in mine)
         back = sum(totals["reacquired"] for _, totals in mine)
         print(f"| {track} | {mode} | {kind} | {lost} | " + " | ".join(cells) + f" | {away} ({back}) |")
+        for seed, (_, totals) in zip(chosen, mine, strict=True):
+            stories += [f"track {track}, {mode}, {kind}, seed {seed}: {loss}" for loss in totals["losses"]]
+        before = mine
+    print("\n" + "\n".join(stories or ["never out of view"]))
+
+
+def ratios(results, others):
+    """Median over seeds of the formation error against that of the other sensor's run of the same seed."""
+    values = [
+        math.inf if a[0] != "done" else a[1]["formation_error_rmse_m"] / b[1]["formation_error_rmse_m"]
+        for a, b in zip(results, others, strict=True)
+        if b[0] == "done"
+    ]
+    return interval(median_with_interval(values), 1.0)
 
 
 def median_of(results, name, scale):
     values = [math.inf if outcome != "done" else totals[name] for outcome, totals in results]
-    found = median_with_interval([value for value in values if value is not None])
+    return interval(median_with_interval([value for value in values if value is not None]), scale)
+
+
+def interval(found, scale):
     if found is None:
         return "-"
-    middle, low, high = ("lost" if found[k] is None else f"{scale * found[k]:.2f}" for k in ("median", "low", "high"))
+    names = ("median", "low", "high")
+    middle, low, high = ("lost" if found[k] is None else f"{scale * found[k]:.2f}" for k in names)
     return f"{middle} ({low}..{high})"
 
 
