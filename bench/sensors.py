@@ -7,7 +7,8 @@ in one picture, median over pictures of the fastest of three, both sensors in tu
 
 light: the Target face in formation, over light's strength and colour.
 
-runs: whole runs of both tracks with the same seeds; medians over seeds, a lost run ranks worst.
+runs: whole runs of both tracks with the same seeds; medians over seeds, a lost run ranks worst. The cost beside them is
+of pictures taken about the formation position.
 
 calibration: what config/tags/fine_tuner.yaml holds for `mode: paper`, fitted to the tags' blocks.
 
@@ -199,6 +200,17 @@ def light():
         print(f"| {name} | " + " | ".join(shares) + " |")
 
 
+def cost():
+    """Milliseconds of detection in pictures taken about the formation position, both sensors in turn."""
+    eyes = {kind: Eye(kind) for kind in KINDS}
+    times = collections.defaultdict(list)
+    for number in range(60):
+        for kind, eye in eyes.items():
+            picture = eye.picture(0.001 * (number - 30), 0.32 + 0.0005 * (number - 30), 0.0, number)[0]
+            times[kind].append(look(eye.detector, picture)[1])
+    return {kind: statistics.median(found) for kind, found in times.items()}
+
+
 def one_run(track, mode, kind, predictor, seed):
     """Run a scenario; its analysis, or what is left of it."""
     settings = [*CONDITIONS, f"marker={kind}", f"fine_tuner.mode={mode}", f"predictor.name={predictor}", f"seed={seed}"]
@@ -212,9 +224,9 @@ def runs(chosen, predictor, jobs):
     results = Parallel(n_jobs=jobs)(delayed(one_run)(*case, predictor, seed) for case in cases for seed in chosen)
     print(f"\npredictor {predictor}, {len(chosen)} seeds\n")
     print("| track | mode | marker | not finished | formation error (cm) | tags against colours | ", end="")
-    print("heading error (deg) | correction (cm) | moves per timestep | out of view (found again) |")
-    print("|" + "---|" * 10)
-    stories, before = [], []
+    print("heading error (deg) | correction (cm) | moves per timestep | out of view (found again) | ms per frame |")
+    print("|" + "---|" * 11)
+    stories, before, costs_ms = [], [], cost()
     for number, (track, mode, kind) in enumerate(cases):
         mine = results[number * len(chosen) : (number + 1) * len(chosen)]
         lost = sum(outcome != "done" for outcome, _ in mine)
@@ -227,7 +239,11 @@ def runs(chosen, predictor, jobs):
         ]
         away = sum(len(totals["losses"]) for _, totals in mine)
         back = sum(totals["reacquired"] for _, totals in mine)
-        print(f"| {track} | {mode} | {kind} | {lost} | " + " | ".join(cells) + f" | {away} ({back}) |")
+        print(
+            f"| {track} | {mode} | {kind} | {lost} | "
+            + " | ".join(cells)
+            + f" | {away} ({back}) | {costs_ms[kind]:.2f} |"
+        )
         for seed, (_, totals) in zip(chosen, mine, strict=True):
             stories += [f"track {track}, {mode}, {kind}, seed {seed}: {loss}" for loss in totals["losses"]]
         before = mine
