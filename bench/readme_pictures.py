@@ -28,6 +28,7 @@ from robot_formation.surface import make_surface
 from robot_formation.vision.detector import BlockDetector
 from robot_formation.vision.parameters import DetectorParameters
 from robot_formation.vision.signatures import load_signatures
+from robot_formation.vision.tags import TagDetector
 from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
 
 PICTURES = Path(__file__).parent.parent / "docs" / "pictures"
@@ -159,31 +160,43 @@ def _dimension(axes, left, right, y, text):
 
 
 def draw_view(folder):
-    """Draw what a follower's camera sees in formation and 12 cm ahead of it, with its blocks, enlarged twice."""
+    """Draw what a follower's camera sees in formation and 12 cm ahead of it, with its blocks."""
+    parameters = from_mapping(
+        DetectorParameters, {"signature_range": [5.0, 6.0, 6.0], "max_merge_dist": 4}, where="bench"
+    )
+    detector = BlockDetector(load_signatures(config_dir() / "signatures.yaml"), parameters)
+    _draw_blocks(folder / "camera.jpg", WORLD, detector, ((0.0, 0.0, 0.0), (0.12, 0.0, 0.0)))
+
+
+def draw_tags(folder):
+    """Draw the marker of tags in formation, and from behind and aside with the leader turned."""
+    world = from_mapping(WorldParameters, {"marker": {"kind": "tags"}}, where="bench")
+    _draw_blocks(folder / "tags.jpg", world, TagDetector(), ((0.0, 0.0, 0.0), (-0.08, 0.06, math.radians(35.0))))
+
+
+def _draw_blocks(path, world, detector, views):
+    """Draw views of the neighbour (follower ahead and farther away in m, neighbour's turn), enlarged twice."""
     plane = make_surface("plane")
     pictures = []
-    for ahead_m in (0.0, 0.12):
-        looking = pose_on_surface(plane, 0.9 + ahead_m, 0.6, 0.0)
-        seen = pose_on_surface(plane, 0.9, 0.6 + FORMATION_DISTANCE_M, 0.0)
-        sensor = Sensor(WORLD.camera, SEED, "follower_1")
-        picture = sensor.expose(sensor.develop(Camera(plane, WORLD).light(looking, [seen])), 0.0)
-        parameters = from_mapping(
-            DetectorParameters, {"signature_range": [5.0, 6.0, 6.0], "max_merge_dist": 4}, where="bench"
-        )
-        detector = BlockDetector(load_signatures(config_dir() / "signatures.yaml"), parameters)
+    for ahead_m, away_m, yaw_rad in views:
+        looking = pose_on_surface(plane, 0.9 + ahead_m, 0.6 - away_m, 0.0)
+        seen = pose_on_surface(plane, 0.9, 0.6 + FORMATION_DISTANCE_M, yaw_rad)
+        sensor = Sensor(world.camera, SEED, "follower_1")
+        picture = sensor.expose(sensor.develop(Camera(plane, world).light(looking, [seen])), 0.0)
         large = cv2.resize(picture, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
         for block in detector.detect(picture):
             left, top = 2 * block.x - block.width, 2 * block.y - block.height
             cv2.rectangle(large, (left, top), (left + 2 * block.width, top + 2 * block.height), (255, 255, 255), 2)
             text = f"{('', 'Target', 'Front', 'Rear')[block.signature]} {block.width} x {block.height}"
-            # The faces touch: the Target's label goes above, the others' below.
-            origin = (left, top - 8 if block.signature == 1 else top + 2 * block.height + 14)
+            # The faces touch: the Target's label goes above, the others' to their outer side, before the light wall.
+            beside = {1: (left, top - 8), 2: (left + 2 * block.width + 12, top + 40), 3: (left - 92, top + 40)}
+            origin = beside[block.signature]
             cv2.putText(large, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0), 1, cv2.LINE_AA)
         pictures.append(large)
     gap = np.full((pictures[0].shape[0], 12, 3), 255, np.uint8)
     both = np.hstack([pictures[0], gap, pictures[1]])
     # Noise makes a PNG of half a megabyte.
-    cv2.imwrite(str(folder / "camera.jpg"), cv2.cvtColor(both, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 90])
+    cv2.imwrite(str(path), cv2.cvtColor(both, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 90])
 
 
 def main():
@@ -191,7 +204,7 @@ def main():
     parser.add_argument("--out", type=Path, default=PICTURES, help="folder (default: docs/pictures)")
     folder = parser.parse_args().out
     folder.mkdir(parents=True, exist_ok=True)
-    for draw in (draw_run, draw_frames, draw_view):
+    for draw in (draw_run, draw_frames, draw_view, draw_tags):
         draw(folder)
     return 0
 

@@ -15,7 +15,8 @@ from robot_formation.parameters import specs, to_mapping
 from robot_formation.vision.files import CAMERA_PARAMETERS, read_parameters
 from robot_formation.vision.parameters import DetectorParameters
 from robot_formation.vision.signatures import load_signatures, save_signatures
-from robot_formation.world.parameters import CameraParameters
+from robot_formation.world import WorldParameters, marker_picture
+from robot_formation.world.parameters import CameraParameters, MarkerParameters
 
 
 def formation(*words):
@@ -243,7 +244,7 @@ def test_wrong_parameters_are_refused(files, text, message):
         ("teach", "a.png", "--region", "1,2,3"),
         ("teach", "a.png", "--point", "1,x"),
         ("teach", "a.png", "--point", "1,2", "--signature", "8"),
-        ("detect", "a.png"),
+        ("detect", "a.png", "--sensor", "tag"),
         ("detect", "a.png", "--signatures", "s.yaml", "--sequence", "--dt-us", "0"),
     ],
 )
@@ -251,3 +252,17 @@ def test_wrong_usage_ends_with_exit_code_2(words, capsys):
     with pytest.raises(SystemExit) as ended:
         formation(*words)
     assert ended.value.code == 2
+
+
+def test_detect_finds_the_faces_of_a_marker_of_tags_without_signatures(files, capsys):
+    world = WorldParameters(marker=MarkerParameters(kind="tags"))
+    images = [write_png(files / f"{face}.png", marker_picture(world, face)) for face in ("target", "front", "rear")]
+    assert formation("detect", *images, "--sensor", "tags", "--json") == 0
+    found = [entry["blocks"] for entry in json.loads(capsys.readouterr().out)]
+    assert [[block["signature"] for block in blocks] for blocks in found] == [[1], [2], [3]]
+    assert all(blocks[0]["width"] == pytest.approx(50, abs=2) for blocks in found)
+
+
+def test_detect_asks_for_signatures_if_colours_are_looked_for(files):
+    with pytest.raises(FormationError, match="--signatures FILE"):
+        formation("detect", write_png(files / "red.png", canvas()))

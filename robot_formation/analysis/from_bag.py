@@ -48,25 +48,34 @@ def run_record(bag: Bag) -> RunRecord:
     wanted = run_topics(robots)
     bag.require({topic: type_name for topic, type_name in wanted.items() if topic in bag.topics})
     messages: dict[str, list[Any]] = defaultdict(list)
+    stamps: dict[str, list[int]] = defaultdict(list)
     for message in bag.messages(wanted):
         messages[message.topic].append(message.message)
-    return record_of(robots, messages, bag.metadata(METADATA_NAME))
+        stamps[message.topic].append(message.stamp_ns)
+    return record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
 
 
-def record_of(robots: Sequence[str], messages: Mapping[str, Sequence[Any]], details: Mapping[str, str]) -> RunRecord:
+def record_of(
+    robots: Sequence[str],
+    messages: Mapping[str, Sequence[Any]],
+    details: Mapping[str, str],
+    stamps: Mapping[str, Sequence[int]] | None = None,
+) -> RunRecord:
     """Put a run's record together from its messages by absolute topic, in order; whoever read them, rosbags or ROS.
 
     Args:
         robots: the leader, then the followers by number.
         messages: those of the topics that `run_topics` names; topics without messages may be absent.
         details: what the run says of itself.
+        stamps: simulated time [ns] of each of these messages, where it is known.
     """
     messages = defaultdict(list, messages)
+    stamps = defaultdict(list, stamps or {})
     markers = messages[_absolute(names.SURFACE.name)]
     tracks = {robot: _track(messages[_absolute(names.ground_truth_odom(robot).name)]) for robot in robots}
     record = RunRecord(
         leader_moved=_stamped(messages[f"/{names.LEADER}/{names.MOVED.name}"]),
-        followers=tuple(_follower(robot, messages) for robot in robots if robot != names.LEADER),
+        followers=tuple(_follower(robot, messages, stamps) for robot in robots if robot != names.LEADER),
         tracks={robot: track for robot, track in tracks.items() if track is not None},
         simulated_s=_last_stamp_ns(messages) / 1e9,
         details=details,
@@ -138,7 +147,7 @@ def run_topics(robots: Sequence[str]) -> dict[str, str]:
         topics[_absolute(odom.name)] = odom.type
         seen = names.overhead_path(robot)
         topics[_absolute(seen.name)] = seen.type
-        topics.update({f"/{robot}/{topic.name}": topic.type for topic in (*_MOTIONS, names.ALIGNMENT)})
+        topics.update({f"/{robot}/{topic.name}": topic.type for topic in (*_MOTIONS, names.MOVE, names.ALIGNMENT)})
     return topics
 
 
@@ -146,10 +155,19 @@ def _absolute(name: str) -> str:
     return name if name.startswith("/") else f"/{name}"
 
 
-def _follower(robot: str, messages: Mapping[str, Sequence[Any]]) -> FollowerRecord:
+def _follower(robot: str, messages: Mapping[str, Sequence[Any]], stamps: Mapping[str, Sequence[int]]) -> FollowerRecord:
     moved, displacements, residuals, predictions = (_stamped(messages[f"/{robot}/{topic.name}"]) for topic in _MOTIONS)
-    states = tuple(message.data for message in messages[f"/{robot}/{names.ALIGNMENT.name}"])
-    return FollowerRecord(robot, moved, displacements, residuals, predictions, states)
+    states = f"/{robot}/{names.ALIGNMENT.name}"
+    return FollowerRecord(
+        robot,
+        moved,
+        displacements,
+        residuals,
+        predictions,
+        states=tuple(message.data for message in messages[states]),
+        state_stamps_ns=tuple(stamps[states]),
+        commands=tuple(_motion(message.pose) for message in messages[f"/{robot}/{names.MOVE.name}"]),
+    )
 
 
 def _stamped(messages: Sequence[Any]) -> tuple[Stamped, ...]:

@@ -17,6 +17,8 @@ overhead error
 heading error
     psi_F - psi_B, between -pi and pi.
 
+Moves by axis and kind, and losses of the neighbour, are in analysis.moves.
+
 What is unavailable is None. Frames and signs: v = +x (forward), u = -y (to the right); turns are apart, in radians.
 """
 
@@ -31,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.analysis.errors import AnalysisError
+from robot_formation.analysis.moves import Moves, move_totals, moves_of
 from robot_formation.analysis.record import FollowerRecord, RunRecord, Stamped
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
 from robot_formation.control.motion import Motion
@@ -58,6 +61,7 @@ class Timestep:
     predicted: Motion | None
     moved: Motion
     corrections: Corrections
+    moves: Moves
     residual: Motion | None
     error_uv_m: tuple[float, float] | None
     heading_error_rad: float | None
@@ -82,6 +86,9 @@ class Timestep:
             "movements": self.corrections.movements,
             "formation_error_m": self.formation_error_m,
             "heading_error_rad": self.heading_error_rad,
+            "correction_turn_rad": self.corrections.turn_rad,
+            "moves_by_axis": self.moves.axes,
+            "moves_by_kind": self.moves.kinds,
         }
 
 
@@ -141,8 +148,13 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
             "the record's start is missing; record the run from its beginning"
         )
     timesteps = tuple(_timestep(record, follower, t) for t in range(1, finished + 1))
-    unfinished = _corrections(record, follower, finished + 1) if opened > finished else None
+    unfinished = None
+    if opened > finished:
+        indices = _moves(record, follower, finished + 1)
+        unfinished = corrections_of([follower.moved[index] for index in indices])
     values = totals(timesteps)
+    counts = [timestep.corrections.movements for timestep in timesteps]
+    values.update(move_totals([timestep.moves for timestep in timesteps], counts, follower))
     values["prediction_coverage_90"] = prediction_coverage(follower)
     values["timesteps_finished"] = finished
     values["timesteps_planned"] = record.timesteps_planned
@@ -219,9 +231,9 @@ def formation_error_uv_m(
     return -(left + distance_m), forward
 
 
-def corrections_of(moves: Sequence[Stamped]) -> Corrections:
+def corrections_of(found: Sequence[Stamped]) -> Corrections:
     """Sum up a timestep's moves without the first, which is the prediction move."""
-    motions = [move.motion for move in moves[1:]]
+    motions = [move.motion for move in found[1:]]
     return Corrections(
         u_m=sum(abs(motion.u_m) for motion in motions),
         v_m=sum(abs(motion.v_m) for motion in motions),
@@ -235,22 +247,24 @@ def _timestep(record: RunRecord, follower: FollowerRecord, t: int) -> Timestep:
     residual = follower.residuals[t - 1].motion if t <= len(follower.residuals) else None
     predicted = follower.predictions[t - 2].motion if 2 <= t <= len(follower.predictions) + 1 else None
     error_uv, heading_error = _ground_truth(record, follower.name, displacement.stamp_ns)
+    indices = _moves(record, follower, t)
     return Timestep(
         t=t,
         predicted=predicted if predicted and predicted.finite else None,
         moved=displacement.motion,
-        corrections=_corrections(record, follower, t),
+        corrections=corrections_of([follower.moved[index] for index in indices]),
+        moves=moves_of(follower, indices, t),
         residual=residual if residual and residual.finite else None,
         error_uv_m=error_uv,
         heading_error_rad=heading_error,
     )
 
 
-def _corrections(record: RunRecord, follower: FollowerRecord, t: int) -> Corrections:
-    """Sum up the corrections of timestep t: from the leader's t-th move to the t-th displacement, if that exists."""
+def _moves(record: RunRecord, follower: FollowerRecord, t: int) -> list[int]:
+    """Find the moves of timestep t: from the leader's t-th move to the t-th displacement, if that exists."""
     start_ns = record.leader_moved[t - 1].stamp_ns
     end_ns = follower.displacements[t - 1].stamp_ns if t <= len(follower.displacements) else math.inf
-    return corrections_of([move for move in follower.moved if start_ns < move.stamp_ns <= end_ns])
+    return [index for index, move in enumerate(follower.moved) if start_ns < move.stamp_ns <= end_ns]
 
 
 def _ground_truth(record: RunRecord, robot: str, stamp_ns: int) -> tuple[tuple[float, float] | None, float | None]:

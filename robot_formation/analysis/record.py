@@ -60,6 +60,8 @@ class FollowerRecord:
         residuals: one per finished timestep: desired minus actual position as the camera estimates it; NaN if unseen.
         predictions: the k-th is for timestep k + 1.
         states: what its fine-tuner said, in order.
+        state_stamps_ns: simulated time of each state; empty where unknown.
+        commands: every move as it was commanded; the k-th of `moved` answers the k-th.
     """
 
     name: str
@@ -68,6 +70,8 @@ class FollowerRecord:
     residuals: tuple[Stamped, ...] = ()
     predictions: tuple[Stamped, ...] = ()
     states: tuple[str, ...] = ()
+    state_stamps_ns: tuple[int, ...] = ()
+    commands: tuple[Motion, ...] = ()
 
     @property
     def lost(self) -> bool:

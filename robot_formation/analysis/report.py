@@ -120,6 +120,8 @@ def _totals(follower: FollowerAnalysis) -> list[str]:
         ("timesteps finished", f"{values['timesteps_finished']}{'' if planned is None else f' of {planned}'}"),
         (f"correction distance from timestep {COLLECTION_TIMESTEPS + 1}", _correction(values)),
         ("correction moves", _movements(values)),
+        *_moves(values),
+        *_losses(values),
         ("formation error", _formation_error(values)),
         ("heading error", f"RMSE {_scaled(values['heading_error_rmse_rad'], math.degrees(1.0))} deg"),
         ("path", ", ".join(f"{robot} {length:.3f} m" for robot, length in values["path_length_m"].items()) or _NONE),
@@ -145,6 +147,25 @@ def _correction(values: dict[str, Any]) -> str:
 def _movements(values: dict[str, Any]) -> str:
     per_timestep = values["movements_per_timestep"]
     return f"{values['movements']}{'' if per_timestep is None else f' ({per_timestep:.2f} per timestep)'}"
+
+
+def _moves(values: dict[str, Any]) -> list[tuple[str, str]]:
+    axes, kinds = values["moves_by_axis"], values["moves_by_kind"]
+    said = [("  by axis", ", ".join(f"{axis} {count}" for axis, count in axes.items()))] if axes else []
+    if kinds:
+        said.append(("  by kind", ", ".join(f"{kind} ({count})" for kind, count in kinds.items())))
+    return said
+
+
+def _losses(values: dict[str, Any]) -> list[tuple[str, str]]:
+    losses = values["losses"]
+    if not losses:
+        return []
+    text = f"{len(losses)}, {values['reacquired']} of them reacquired"
+    if values["reacquisition_median_s"] is not None:
+        median_s, max_s = values["reacquisition_median_s"], values["reacquisition_max_s"]
+        text += f" (median {median_s:.1f} s, longest {max_s:.1f} s)"
+    return [("neighbour out of view", text)]
 
 
 def _formation_error(values: dict[str, Any]) -> str:

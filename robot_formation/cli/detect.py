@@ -8,14 +8,18 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robot_formation.errors import FormationError
+
 if TYPE_CHECKING:
     from robot_formation.vision.block import Block
-    from robot_formation.vision.detector import BlockDetector
+    from robot_formation.vision.parameters import DetectorParameters
     from robot_formation.vision.picture import Picture
+    from robot_formation.vision.tags import BlockSensor
 
 DESCRIPTION = """\
-Find the blocks of taught colours in images, as a Pixy2 does. Each image is taken by itself (shown twice, with block
-filtering 0), or, with --sequence, as the next frame of one sequence, with tracking.
+Find the blocks of taught colours in images, as a Pixy2 does, or, with --sensor tags, the faces of a marker of tags.
+Each image is taken by itself (shown twice, with block filtering 0), or, with --sequence, as the next frame of one
+sequence, with tracking.
 """
 _FRAME_US = 16_200
 
@@ -27,7 +31,10 @@ def add_parser(subparsers: Any) -> None:
         "images", metavar="IMAGE", type=Path, nargs="+", help="image file, 316 x 208 (others are scaled)"
     )
     parser.add_argument(
-        "--signatures", metavar="FILE", type=Path, required=True, help="taught signatures, YAML or JSON"
+        "--sensor", choices=("colours", "tags"), default="colours", help="what is looked for (default: colours)"
+    )
+    parser.add_argument(
+        "--signatures", metavar="FILE", type=Path, help="taught signatures, YAML or JSON; needed for colours"
     )
     parser.add_argument(
         "--parameters", metavar="FILE", type=Path, help="parameters by our names or PixyMon's, YAML or JSON"
@@ -55,15 +62,13 @@ def run(args: argparse.Namespace) -> int:
     import dataclasses
     import json
 
-    from robot_formation.vision.detector import BlockDetector
     from robot_formation.vision.files import read_parameters, read_picture
     from robot_formation.vision.parameters import DetectorParameters
-    from robot_formation.vision.signatures import load_signatures
 
     parameters = read_parameters(args.parameters, _warn) if args.parameters else DetectorParameters()
     if not args.sequence:
         parameters = dataclasses.replace(parameters, block_filtering=0)
-    detector = BlockDetector(load_signatures(args.signatures), parameters)
+    detector = _detector(args.sensor, args.signatures, parameters)
     pictures = ((path, read_picture(path, _warn)) for path in args.images)
     frames = _sequence(detector, pictures, args.dt_us) if args.sequence else _singles(detector, pictures)
     results = []
@@ -75,10 +80,22 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _detector(sensor: str, signatures: Path | None, parameters: DetectorParameters) -> BlockSensor:
+    from robot_formation.vision.detector import BlockDetector
+    from robot_formation.vision.signatures import load_signatures
+    from robot_formation.vision.tags import TagDetector
+
+    if sensor == "tags":
+        return TagDetector(tracking=parameters)
+    if signatures is None:
+        raise FormationError("colours need --signatures FILE with what 'formation teach' has taught, or --sensor tags")
+    return BlockDetector(load_signatures(signatures), parameters)
+
+
 Frame = tuple[Path, "Picture", "list[Block]"]
 
 
-def _singles(detector: BlockDetector, pictures: Iterable[tuple[Path, Picture]]) -> Iterator[Frame]:
+def _singles(detector: BlockSensor, pictures: Iterable[tuple[Path, Picture]]) -> Iterator[Frame]:
     """Each picture by itself: the tracker reports a box from its second frame on."""
     for path, picture in pictures:
         detector.reset()
@@ -86,7 +103,7 @@ def _singles(detector: BlockDetector, pictures: Iterable[tuple[Path, Picture]]) 
         yield path, picture, detector.process(picture, _FRAME_US)
 
 
-def _sequence(detector: BlockDetector, pictures: Iterable[tuple[Path, Picture]], dt_us: int) -> Iterator[Frame]:
+def _sequence(detector: BlockSensor, pictures: Iterable[tuple[Path, Picture]], dt_us: int) -> Iterator[Frame]:
     for number, (path, picture) in enumerate(pictures):
         yield path, picture, detector.process(picture, number * dt_us)
 

@@ -1,4 +1,4 @@
-"""Block detector: the Pixy2's colour connected components on the camera's pictures."""
+"""Block detector: the Pixy2's colour connected components, or tags, on the camera's pictures."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from robot_formation.vision.detector import BlockDetector
 from robot_formation.vision.parameters import DetectorParameters
 from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, scaled
 from robot_formation.vision.signatures import Signature, load_signatures
+from robot_formation.vision.tags import BlockSensor, TagDetector, TagParameters
 from robot_formation.vision.tracking import ClockError
 
 _RATE_FRAMES = 31
@@ -29,11 +30,19 @@ _WHITE = (255, 255, 255)
 
 @dataclass(frozen=True)
 class BlockDetectorNodeParameters(DetectorParameters):
-    """The camera's own parameters and where its taught signatures are stored."""
+    """The camera's own parameters, where its taught signatures are stored, and the search for tags instead."""
+
+    sensor: str = parameter(
+        "colours",
+        "What is looked for; colours: blocks of the taught colours; tags: the ArUco tags of a marker of that kind",
+        choices=("colours", "tags"),
+    )
 
     signatures_file: str = parameter(
         "", "YAML or JSON file of taught signatures; empty: config/signatures.yaml, taught under the world's light"
     )
+
+    tags: TagParameters = TagParameters()
 
     def load(self) -> list[Signature]:
         """Read the taught signatures.
@@ -51,8 +60,8 @@ class BlockDetectorComponent(Component):
 
     def __init__(self, parameters: BlockDetectorNodeParameters, place: Place) -> None:
         super().__init__(place)
-        self._file = parameters.signatures_file
-        self._detector = BlockDetector(parameters.load(), parameters)
+        self._parameters = parameters
+        self._detector = _detector(parameters)
         self._frames = 0
         self._dropped = 0
         self._scaled = False
@@ -71,14 +80,20 @@ class BlockDetectorComponent(Component):
         return [names.BLOCKS, names.BLOCKS_IMAGE]
 
     def set_parameters(self, parameters: BlockDetectorNodeParameters) -> None:
-        """See `Component`: tracked blocks are kept; a changed file of signatures is read.
+        """See `Component`: tracked blocks are kept, unless the sensor changes; a changed file of signatures is read.
 
         Raises:
-            SignatureError: if that file can't be used; nothing is changed then.
+            FormationError: if that file, or the other sensor, can't be used; nothing is changed then.
         """
-        changed = parameters.signatures_file != self._file
-        self._detector.configure(parameters.load() if changed else self._detector.signatures, parameters)
-        self._file = parameters.signatures_file
+        old, detector = self._parameters, self._detector
+        if parameters.sensor != old.sensor:
+            self._detector = _detector(parameters)
+        elif isinstance(detector, TagDetector):
+            detector.configure(parameters.tags, parameters)
+        elif isinstance(detector, BlockDetector):
+            changed = parameters.signatures_file != old.signatures_file
+            detector.configure(parameters.load() if changed else detector.signatures, parameters)
+        self._parameters = parameters
 
     def listened_to(self, topic: names.Topic, listeners: int) -> None:
         """See `Component`: the annotated picture is drawn only while somebody listens."""
@@ -127,6 +142,12 @@ class BlockDetectorComponent(Component):
             self._scaled = True
             self.warn(f"pictures of {width} x {height} are scaled to {WIDTH} x {HEIGHT}")
         return scaled(pixels)
+
+
+def _detector(parameters: BlockDetectorNodeParameters) -> BlockSensor:
+    if parameters.sensor == "tags":
+        return TagDetector(parameters.tags, parameters)
+    return BlockDetector(parameters.load(), parameters)
 
 
 def _annotated(picture: Picture, blocks: list[Block]) -> Picture:

@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
-from robot_formation import exit_codes
+from robot_formation import exit_codes, names
 from robot_formation.analysis.from_bag import record_of, run_topics
 from robot_formation.analysis.record import RunRecord
 from robot_formation.experiment.in_process import InProcessRun
@@ -29,10 +29,16 @@ def run_in_memory(
     """
     wanted = run_topics(scenario.robots)
     messages: dict[str, list[Any]] = defaultdict(list)
+    stamps: dict[str, list[int]] = defaultdict(list)
+    now_ns = 0
 
     def listen(topic: str, message: Any) -> None:
-        if topic in wanted:
+        nonlocal now_ns
+        if topic == names.CLOCK_TOPIC.name:
+            now_ns = message.clock.sec * 10**9 + message.clock.nanosec
+        elif topic in wanted:
             messages[topic].append(message)
+            stamps[topic].append(now_ns)
 
     run = make_run(scenario, listen) if make_run is not None else InProcessRun(scenario, listen=listen)
     code, _ = run.run()
@@ -41,4 +47,4 @@ def run_in_memory(
         "timesteps": str(scenario.parameters("leader")["timesteps"]),
         "outcome": OUTCOMES.get(code, "incomplete"),
     }
-    return record_of(scenario.robots, messages, details)
+    return record_of(scenario.robots, messages, details, stamps)

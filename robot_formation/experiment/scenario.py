@@ -24,12 +24,14 @@ from robot_formation.surface import SURFACES
 # Parameters that follow from the setup, and what to set instead.
 _FIXED = {
     "world": {
+        "marker.kind": "'marker'",
         "seed": "'seed'",
         "robots": "'followers'",
         "start_x_m": "'start_x_m' of the scenario",
         "start_y_m": "'start_y_m' of the scenario",
         "start_heading_rad": "'heading_deg' of the scenario",
     },
+    "block_detector": {"sensor": "'marker'"},
     "leader": {"followers": "'followers'"},
     "fine_tuner": {"done_listeners": "'followers'"},
 }
@@ -49,6 +51,9 @@ class Setup:
     start_x_m: float = parameter(0.763, "Start of the leader", unit="m", low=-10.0, high=100.0)
     start_y_m: float = parameter(0.158, "Start of the leader", unit="m", low=-10.0, high=100.0)
     heading_deg: float = parameter(90.0, "Heading of the formation", unit="deg", low=-360.0, high=360.0)
+    marker: str = parameter(
+        "colours", "What the robots' markers carry and their cameras look for", choices=("colours", "tags")
+    )
 
 
 @dataclass(frozen=True)
@@ -66,10 +71,12 @@ class Scenario:
     def parameters(self, kind: str) -> dict[str, Any]:
         """Collect a node's parameters: config/, then the scenario's, then what the setup fixes; flat and checked.
 
+        With `marker: tags` the files in config/tags, which hold what differs then, come after those in config/.
+
         Raises:
             ParameterError: on an unknown name, a wrong type or a value out of range.
         """
-        values = {**node_defaults(kind), **self.sections.get(kind, {})}
+        values = {**self._defaults(kind), **self.sections.get(kind, {})}
         if kind == "world":
             values.update(self._world())
         elif kind == "overhead_tracker":
@@ -80,6 +87,13 @@ class Scenario:
             values["followers"] = self.robots[1:]
         checked = from_mapping(KINDS[kind].parameter_class(), values, where=kind)
         return to_mapping(checked)
+
+    def _defaults(self, kind: str) -> dict[str, Any]:
+        values = node_defaults(kind)
+        overlay = config_dir() / "tags" / f"{kind}.yaml"
+        if self.setup.marker == "tags" and overlay.exists():
+            values.update(parameter_file(overlay))
+        return values
 
     def hosts(self) -> Iterator[tuple[NodeKind, str]]:
         """Yield every node to start, in order, with its robot ('' for the run's own)."""
@@ -241,14 +255,22 @@ def node_defaults(kind: str) -> dict[str, Any]:
     Raises:
         ScenarioError: if the file has not the form of a ROS parameter file.
     """
-    path = config_dir() / f"{kind}.yaml"
+    return parameter_file(config_dir() / f"{kind}.yaml")
+
+
+def parameter_file(path: Path) -> dict[str, Any]:
+    """Read a ROS parameter file for nodes of any name, flat.
+
+    Raises:
+        ScenarioError: if it can't be read or has another form.
+    """
     # A run asks for them many times, and PyYAML takes milliseconds each.
     changed_ns = path.stat().st_mtime_ns if path.exists() else 0
-    return dict(_node_defaults(path, changed_ns))
+    return dict(_parameter_file(path, changed_ns))
 
 
 @lru_cache(maxsize=64)
-def _node_defaults(path: Path, changed_ns: int) -> dict[str, Any]:
+def _parameter_file(path: Path, changed_ns: int) -> dict[str, Any]:
     content = read_yaml(path)
     try:
         return flatten(content["/**"]["ros__parameters"])

@@ -87,10 +87,11 @@ def _add_marker(robot: Element, parameters: WorldParameters) -> None:
     edge, half = marker.edge_m, 0.5 * marker.edge_m
     link = ElementTree.SubElement(robot, "link", name="marker")
     _box(link, "visual", (edge, edge, edge), (0.0, 0.0, 0.0), marker.body_rgb)
-    # Thin plates are the coloured faces: URDF gives a box one colour only.
-    _box(link, "visual", (edge, _PLATE_M, edge), (0.0, -half, 0.0), marker.target_rgb)
-    _box(link, "visual", (_PLATE_M, edge, edge), (half, 0.0, 0.0), marker.front_rgb)
-    _box(link, "visual", (_PLATE_M, edge, edge), (-half, 0.0, 0.0), marker.rear_rgb)
+    # Thin plates are the coloured faces: URDF gives a box one colour only. Tags are left out.
+    target, front, rear = marker.face_colours
+    _box(link, "visual", (edge, _PLATE_M, edge), (0.0, -half, 0.0), target)
+    _box(link, "visual", (_PLATE_M, edge, edge), (half, 0.0, 0.0), front)
+    _box(link, "visual", (_PLATE_M, edge, edge), (-half, 0.0, 0.0), rear)
     dot = ElementTree.SubElement(link, "visual")
     _origin(dot, (0.0, 0.0, half))
     geometry = ElementTree.SubElement(dot, "geometry")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from robot_formation.parameters import ParameterError, parameter
 
+MARKER_KINDS = ("colours", "tags")
 DRIVE_MODES = ("pwm_stop", "pid")
 CAMERA_MODES = ("stream", "on_demand")
 
@@ -220,25 +221,39 @@ class OverheadParameters:
 
 @dataclass(frozen=True)
 class MarkerParameters:
-    """Tri-colour cube over base_link's origin: Target looks right (-y), Front +x, Rear -x, a white dot on top.
+    """Cube over base_link's origin: its Target face looks right (-y), Front +x, Rear -x, a white dot on top.
 
-    Colours are red, green, blue from 0 to 255 in linear light.
+    The three faces have a colour each, or carry a tag each. Colours are red, green, blue from 0 to 255 in linear light.
     """
 
+    kind: str = parameter(
+        "colours",
+        "what tells the faces apart; colours: one each; tags: an ArUco tag each, for block_detector's sensor 'tags'",
+        choices=MARKER_KINDS,
+    )
     edge_m: float = parameter(0.06, "edge of the cube", unit="m", low=0.005, high=0.5)
     top_m: float = parameter(0.216, "height of its top, the robot's height", unit="m", low=0.02, high=2.0)
     target_rgb: tuple[int, ...] = parameter((205, 14, 16), "Target face", low=0, high=255)
     front_rgb: tuple[int, ...] = parameter((16, 150, 22), "Front face", low=0, high=255)
     rear_rgb: tuple[int, ...] = parameter((14, 34, 200), "Rear face", low=0, high=255)
+    tag_light_rgb: tuple[int, ...] = parameter((200, 200, 200), "tags: light modules and margin", low=0, high=255)
+    tag_dark_rgb: tuple[int, ...] = parameter((12, 12, 13), "tags: dark modules", low=0, high=255)
     body_rgb: tuple[int, ...] = parameter((12, 12, 13), "robot body and the cube's other faces", low=0, high=255)
     dot_rgb: tuple[int, ...] = parameter((230, 230, 230), "reference dot", low=0, high=255)
     dot_radius_m: float = parameter(0.015, "radius of the reference dot", unit="m", low=0.001, high=0.2)
 
     def __post_init__(self) -> None:
         """Check that every colour has three components."""
-        for name in ("target_rgb", "front_rgb", "rear_rgb", "body_rgb", "dot_rgb"):
-            if len(getattr(self, name)) != 3:
-                raise ParameterError(f"world: 'marker.{name}' needs three numbers (red, green, blue)")
+        for field in fields(self):
+            if field.name.endswith("_rgb") and len(getattr(self, field.name)) != 3:
+                raise ParameterError(f"world: 'marker.{field.name}' needs three numbers (red, green, blue)")
+
+    @property
+    def face_colours(self) -> tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]:
+        """Ground colours of Target, Front and Rear."""
+        if self.kind == "tags":
+            return (self.tag_light_rgb,) * 3
+        return self.target_rgb, self.front_rgb, self.rear_rgb
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from robot_formation.surface import Surface
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
+from robot_formation.world.tag_faces import FACES, tag_rectangles
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
@@ -50,13 +51,16 @@ class Scene:
         grey = marker.body_rgb
         body = (chassis.length_m, chassis.width_m, chassis.body_top_m - chassis.body_bottom_m)
         foot = marker.top_m - marker.edge_m
-        cube = (marker.target_rgb, marker.front_rgb, marker.rear_rgb)
         self._faces: list[tuple[Array, Array, Array]] = []
         self._add_box(body, chassis.body_bottom_m, (grey,) * 5)
         if foot > chassis.body_top_m:
             self._add_box((PEDESTAL_M, PEDESTAL_M, foot - chassis.body_top_m), chassis.body_top_m, (grey,) * 5)
-        target, front, rear = cube
+        target, front, rear = marker.face_colours
         self._add_box((marker.edge_m,) * 3, foot, (front, rear, grey, target, grey))
+        if marker.kind == "tags":
+            for face in FACES:
+                for corners, normal, light in tag_rectangles(face, marker.edge_m, marker.top_m - 0.5 * marker.edge_m):
+                    self._add_face(corners, normal, marker.tag_light_rgb if light else marker.tag_dark_rgb)
         around = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
         dot = np.stack([np.cos(around), np.sin(around), np.zeros(16)], axis=1) * marker.dot_radius_m
         self._add_face(dot + np.array([0.0, 0.0, marker.top_m]), np.array([0.0, 0.0, 1.0]), marker.dot_rgb)

@@ -1,0 +1,156 @@
+"""What a follower's moves were for, and how often and how long it had lost its beacon neighbour from view.
+
+moves by axis
+    of the moves after a timestep's prediction move, how many had a leg along u, a leg along v and a turn by their
+    command (more than 0.1 mm, or 0.1 mrad); a move of several legs counts for each of them.
+moves by kind
+    the same moves by what the fine-tuner said of them: `correct: REASON` or `search: REASON`.
+loss
+    from the end of the first look that didn't show the neighbour (`hold` or `search`) to the end of the look that
+    showed it again (`reacquired`), or to where the follower gave up (`lost`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from statistics import median
+from typing import Any
+
+from robot_formation.analysis.record import FollowerRecord
+from robot_formation.control.motion import Motion
+
+AXES = ("u", "v", "turn")
+UNKNOWN = "unknown"
+"""Kind of a move of which the fine-tuner said nothing."""
+_LEAST = 1e-4
+_OPENING = ("collect", "predict")
+_NOT_SEEN = ("hold", "search")
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Numbers of moves by axis, None where no commands are known, and by kind."""
+
+    axes: Mapping[str, int] | None
+    kinds: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """One loss of the neighbour in timestep t: looks in vain, moves of the search, simulated seconds (None: unknown)
+    until it was seen again, or until the follower gave up or the record ends, and whether it was seen again.
+    """
+
+    t: int
+    looks: int
+    moves: int
+    seconds: float | None
+    reacquired: bool
+
+
+def moves_of(follower: FollowerRecord, indices: Sequence[int], t: int) -> Moves:
+    """Count a timestep's moves.
+
+    Args:
+        follower: whose moves.
+        indices: of the timestep's moves in `follower.moved`; the first one is the prediction move and isn't counted.
+        t: the timestep.
+    """
+    corrections = indices[1:]
+    said = [text for text in _texts(follower, t) if _word(text) in ("correct", "search")]
+    said += [UNKNOWN] * (len(corrections) - len(said))
+    return Moves(_axes(follower, corrections), dict(Counter(said[: len(corrections)])))
+
+
+def summed(moves: Sequence[Moves]) -> Moves:
+    """Add up the moves of several timesteps."""
+    kinds: Counter[str] = Counter()
+    for entry in moves:
+        kinds.update(entry.kinds)
+    known = [entry.axes for entry in moves if entry.axes is not None]
+    axes = {axis: sum(entry[axis] for entry in known) for axis in AXES} if len(known) == len(moves) else None
+    return Moves(axes, dict(kinds))
+
+
+def losses(follower: FollowerRecord) -> tuple[Loss, ...]:
+    """List a follower's losses in order, in all timesteps from 0 on."""
+    found: list[Loss] = []
+    begun: int | None = None
+    looks = moves = 0
+    for number, (t, text) in enumerate(_with_timestep(follower.states)):
+        word = _word(text)
+        if word in _NOT_SEEN:
+            begun = number if begun is None else begun
+            looks, moves = looks + 1, moves + (word == "search")
+        elif word in ("reacquired", "lost"):
+            first = number if begun is None else begun
+            found.append(Loss(t, looks, moves, _seconds(follower, first, number), word == "reacquired"))
+            begun, looks, moves = None, 0, 0
+    if begun is not None:
+        last = len(follower.states) - 1
+        t = list(_with_timestep(follower.states))[last][0]
+        found.append(Loss(t, looks, moves, _seconds(follower, begun, last), False))
+    return tuple(found)
+
+
+def move_totals(timesteps: Sequence[Moves], movements: Sequence[int], follower: FollowerRecord) -> dict[str, Any]:
+    """Sum up a follower's moves and losses as the command line's JSON has them.
+
+    Args:
+        timesteps: the moves of each finished timestep.
+        movements: how many there were in each.
+        follower: whose losses.
+    """
+    moves, lost = summed(timesteps), losses(follower)
+    seconds = [loss.seconds for loss in lost if loss.reacquired and loss.seconds is not None]
+    return {
+        "moves_by_axis": moves.axes,
+        "moves_by_kind": moves.kinds,
+        "movements_median": median(movements) if movements else None,
+        "movements_max": max(movements, default=None),
+        "losses": [asdict(loss) for loss in lost],
+        "reacquired": sum(loss.reacquired for loss in lost),
+        "reacquisition_median_s": median(seconds) if seconds else None,
+        "reacquisition_max_s": max(seconds, default=None),
+    }
+
+
+def _word(text: str) -> str:
+    return text.split(":")[0]
+
+
+def _with_timestep(states: Sequence[str]) -> Iterator[tuple[int, str]]:
+    """Pair each state with its timestep: a prediction move opens the next one."""
+    t = 0
+    for text in states:
+        t += _word(text) in _OPENING
+        yield t, text
+
+
+def _texts(follower: FollowerRecord, t: int) -> list[str]:
+    return [text for timestep, text in _with_timestep(follower.states) if timestep == t]
+
+
+def _axes(follower: FollowerRecord, indices: Sequence[int]) -> dict[str, int] | None:
+    """Count by commanded axes; every command is answered by one measured move, so they pair by their order."""
+    if not 0 <= len(follower.commands) - len(follower.moved) <= 1:
+        return None
+    counts = dict.fromkeys(AXES, 0)
+    for index in indices:
+        for axis, size in zip(AXES, _sizes(follower.commands[index]), strict=True):
+            counts[axis] += size > _LEAST
+    return counts
+
+
+def _sizes(motion: Motion) -> tuple[float, float, float]:
+    """Lengths of a move's legs along u and v and of its turn; the drive turns first."""
+    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+    return abs(c * motion.y_m - s * motion.x_m), abs(c * motion.x_m + s * motion.y_m), abs(motion.yaw_rad)
+
+
+def _seconds(follower: FollowerRecord, first: int, last: int) -> float | None:
+    stamps = follower.state_stamps_ns
+    return (stamps[last] - stamps[first]) / 1e9 if len(stamps) == len(follower.states) else None
