@@ -69,11 +69,25 @@ class FilterParameters:
         0.0007, "How far the neighbour's step leads aside from its heading", unit="m", low=0.0, high=1.0
     )
     slip_per_lean: float = parameter(
-        1.0,
+        0.76,
         "Sideways slip of a driving robot: share of its way per radian of lateral slope",
         unit="1/rad",
         low=0.0,
         high=100.0,
+    )
+    slip_growth: float = parameter(
+        12.0,
+        "How much that grows on the way down, per squared share by which drives go too far there",
+        unit="1/rad",
+        low=0.0,
+        high=1000.0,
+    )
+    turn_growth: float = parameter(
+        22.0,
+        "Relative turn by slip on the way down: per way, lean and squared share by which drives go too far",
+        unit="1/(m rad)",
+        low=0.0,
+        high=1000.0,
     )
     neighbour_turn_sigma_rad: float = parameter(
         0.002, "How far the neighbour turns by slip in its step", unit="rad", low=0.0, high=1.0
@@ -162,21 +176,32 @@ class PoseFilter:
         hypothesis.state = moved
         hypothesis.covariance = jacobian @ hypothesis.covariance @ jacobian.T + swing @ noise @ swing.T
 
-    def neighbour_stepped(self, step: Motion) -> None:
-        """Take that the neighbour has made a step of about this size in its own frame."""
+    def neighbour_stepped(self, step: Motion, overshoot: float = 0.0, sidestep_sigma_m: float | None = None) -> None:
+        """Take that the neighbour has made a step of about this size in its own frame.
+
+        Args:
+            step: its way ahead, and aside if it slips as the follower does.
+            overshoot: how much farther than asked for the robots drive here, share of the way.
+            sidestep_sigma_m: how certain the way aside is; by default as in the parameters.
+        """
         p = self._p
+        overshoot = max(0.0, overshoot)
+        slip = p.slip_per_lean + p.slip_growth * overshoot**2
+        sidestep = p.neighbour_sidestep_sigma_m if sidestep_sigma_m is None else sidestep_sigma_m
         for hypothesis in self.hypotheses:
             state, covariance = hypothesis.state, hypothesis.covariance
             c, s = math.cos(state[YAW]), math.sin(state[YAW])
             along = np.array([[c, -s], [s, c]])
             # The neighbour slips as the follower does, and by as much more as it leans more.
-            aside = step.y_m - p.slip_per_lean * state[CURVATURE] * state[Y] * abs(step.x_m)
+            aside = step.y_m - slip * state[CURVATURE] * state[Y] * abs(step.x_m)
             jacobian = np.eye(SIZE)
             jacobian[:2, YAW] = along @ (-aside, step.x_m)
             hypothesis.state = state.copy()
             hypothesis.state[:2] += along @ (step.x_m, aside)
+            lean = state[CURVATURE] * state[Y]
+            hypothesis.state[YAW] += p.turn_growth * overshoot**2 * lean * abs(step.x_m)
             noise = np.zeros((SIZE, SIZE))
-            noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, p.neighbour_sidestep_sigma_m**2]) @ along.T
+            noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, sidestep**2]) @ along.T
             noise[YAW, YAW] = p.neighbour_turn_sigma_rad**2
             noise[CURVATURE, CURVATURE] = p.curvature_drift_per_m**2
             noise[TWIST, TWIST] = (0.2 * p.twist_sigma_rad) ** 2
