@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from robot_formation.control.alignment import TARGET, Box, Decision, Verdict
@@ -18,12 +19,12 @@ from robot_formation.parameters import parameter
 
 _SURPRISE = 12.0
 """Mean square of a look's innovations by their scatter from which on something is in the way."""
-_VANTAGES_M = (0.1, -0.1, -0.13, 0.07, 0.12, -0.08, -0.11)
-"""Places along v, one hop of the drive apart, from where a second face shows; the near side is the positive one."""
+_VANTAGES_M = (0.135, -0.135, 0.135, 0.115)
+"""Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
 _VANTAGE_BESIDE_M = 0.33
 _VANTAGE_NEAR = Motion(0.02, 0.03, math.radians(6.0))
 """How far from such a place is near enough."""
-_LAST_MOVES = 6
+_LAST_MOVES = 5
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
 _FIRST_SIDESTEP_SIGMA_M = 0.002
@@ -41,8 +42,11 @@ class PreciseParameters:
     turn_rad: float = parameter(
         math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
     )
+    first_share: float = parameter(
+        0.6, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
+    )
     certain_rad: float = parameter(
-        math.radians(0.8),
+        math.radians(0.65),
         "Standard deviation of the heading that ends the first alignment",
         unit="rad",
         low=1e-3,
@@ -84,7 +88,7 @@ class PreciseAlignment:
         self._moves = 0
         self._timestep = 0
         self._last = Motion()
-        self._vantages: list[float] | None = None  # None: not chosen yet; the last ones are left
+        self._vantages: list[float] | None = None  # those still to be visited; None: not chosen yet
 
     def restart(self, timestep: int) -> None:
         """Begin a timestep: the neighbour has made its step."""
@@ -142,11 +146,11 @@ class PreciseAlignment:
         searching = unsure and self._timestep == 0 and self._moves < p.max_moves - _LAST_MOVES and self._vantages != []
         if not searching and self._within(way_to(state, FORMATION)):
             return Decision(Verdict.ALIGNED, reason="inside the tolerances")
-        if self._moves >= p.max_moves:
-            return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
         motion, reason = self._next(state, searching)
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
+        if self._moves + legs(motion) > p.max_moves:
+            return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
         self._moves += legs(motion)
         return Decision(Verdict.MOVE, self._experience.compensated(motion), reason)
 
@@ -157,11 +161,12 @@ class PreciseAlignment:
         if self._filter.yaw_sigma_rad > _CLUELESS_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
             return self._approach.face(states), "turn towards the marker"
         if searching:
-            while (vantage := self._vantage(state)) is not None:
+            for vantage in self._places(state):
                 motion = self._without_trifles(self._approach.next(states, vantage), _VANTAGE_NEAR)
                 if motion != Motion():
                     return motion, "to see two faces"
-        trifle = Motion(0.5 * p.v_tolerance_m, 0.5 * p.u_tolerance_m, 0.4 * p.heading_tolerance_rad)
+        share = 0.5 if self._timestep > 0 else 0.5 * p.first_share
+        trifle = Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.4 * p.heading_tolerance_rad)
         return self._without_trifles(self._approach.next(states, FORMATION), trifle), "to the formation position"
 
     def _boxes(self, frames: Frames) -> dict[int, Box]:
@@ -173,9 +178,10 @@ class PreciseAlignment:
 
     def _within(self, way: Motion) -> bool:
         p = self._p
+        share = 1.0 if self._timestep > 0 else p.first_share
         return (
-            abs(way.y_m) <= p.u_tolerance_m
-            and abs(way.x_m) <= p.v_tolerance_m
+            abs(way.y_m) <= share * p.u_tolerance_m
+            and abs(way.x_m) <= share * p.v_tolerance_m
             and abs(way.yaw_rad) <= p.heading_tolerance_rad
         )
 
@@ -190,12 +196,14 @@ class PreciseAlignment:
         c, s = math.cos(yaw), math.sin(yaw)
         return Motion(c * x - s * y, s * x + c * y, yaw)
 
-    def _vantage(self, state: Vector) -> Motion | None:
-        """A place behind or ahead from where a second face shows, on both sides in turn; None after the last.
+    def _places(self, state: Vector) -> Iterator[Motion]:
+        """Yield the places left to look from, behind and ahead in turn; the one that is asked beyond is done with.
 
         The outer edges of Front and Rear are biased alike, so that the two sides' errors in heading cancel.
         """
         if self._vantages is None:
             behind = way_to(state, Motion()).x_m > 0.0
             self._vantages = [-place if behind else place for place in _VANTAGES_M]
-        return Motion(self._vantages.pop(0), -_VANTAGE_BESIDE_M, 0.0) if self._vantages else None
+        while self._vantages:
+            yield Motion(self._vantages[0], -_VANTAGE_BESIDE_M, 0.0)
+            self._vantages.pop(0)

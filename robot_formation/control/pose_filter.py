@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
-from robot_formation.control.marker_view import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, view
+from robot_formation.control.marker_view import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, sliver, view
 from robot_formation.control.motion import Motion
 from robot_formation.control.relative_pose import (
     CURVATURE,
@@ -294,11 +294,11 @@ class PoseFilter:
         hypothesis.cost += self._contradiction(state, seen)
 
     def _trusted(self, state: Vector, seen: View) -> list[Edge]:
-        """List the edges; a sliver of the Front face may shift the Target block's right one."""
-        sliver = FRONT not in seen.faces and self._model.widths(state)[FRONT] > 0.0
-        sigma = self._edges.sliver_sigma_px
+        """List the edges; a Front face that is not reported may shift the Target block's right one."""
+        if FRONT in seen.faces or (front_px := self._model.widths(state)[FRONT]) <= 0.0:
+            return list(seen.edges)
         return [
-            replace(edge, sigma_px=sigma) if sliver and (edge.face, edge.side) == (TARGET, "right") else edge
+            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (TARGET, "right") else edge
             for edge in seen.edges
         ]
 
