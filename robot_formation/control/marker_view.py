@@ -40,7 +40,11 @@ class EdgeParameters:
         0.9, "Scatter of the outer edges of Front and Rear of middling width", unit="px", low=0.01, high=20.0
     )
     poor_column_sigma_px: float = parameter(
-        1.7, "Scatter of the outer edges of Front and Rear where they are narrow or wide", unit="px", low=0.01, high=20.0
+        1.7,
+        "Scatter of the outer edges of Front and Rear where they are narrow or wide",
+        unit="px",
+        low=0.01,
+        high=20.0,
     )
     wide_px: float = parameter(20.0, "Reported width from which on they are wide", unit="px", low=0.0, high=300.0)
     sliver_px: float = parameter(
