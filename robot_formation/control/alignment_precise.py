@@ -131,7 +131,9 @@ class PreciseAlignment:
             self._filter.forget()
             strange = False
         if not boxes or strange:
-            return self._search.missed(self._last if self._moves else Motion(), self.offset())
+            decision = self._search.missed(self._last if self._moves else Motion(), self.offset())
+            self._moves += legs(decision.motion)
+            return decision
         self._search.found()
         first = not self._filter.known
         self._filter.look(boxes)

@@ -107,8 +107,8 @@ def _mean(boxes: Sequence[Box]) -> Box:
 def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
     """Take the edges that can be trusted out of a look's boxes.
 
-    Where two faces meet, the one on the right tells the common edge: the detector's rows are exact there only. Front
-    and Rear give columns only beside a Target block: their slivers are often broken up in height.
+    Where two faces meet, the one on the right tells the common edge: the detector's rows are exact there only. The
+    rows are those of the widest face: a sliver is often broken up in height.
     """
     edges: list[Edge] = []
     near = p.column_sigma_px
@@ -119,18 +119,18 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
         edges.append(Edge(TARGET, "left", target.left - p.target_left_px - late, sigma))
         if front is None:
             edges.append(Edge(TARGET, "right", target.right - p.target_right_px, near))
-        edges += _rows(TARGET, target, p, 1.0)
     if front is not None:
         edges.append(Edge(FRONT, "left", front.left - p.front_left_px, near))
         narrow = front.width < p.narrow_px
         bias = p.narrow_right_px if narrow else p.front_right_px
         edges.append(Edge(FRONT, "right", front.right - bias, _far(front, p)))
-        edges += _rows(FRONT, front, p, 2.0) if target is None else []
     if rear is not None:
         edges.append(Edge(REAR, "left", rear.left - p.rear_left_px, _far(rear, p)))
         if target is None:
             edges.append(Edge(REAR, "right", rear.right - p.rear_right_px, _far(rear, p)))
-            edges += _rows(REAR, rear, p, 2.0)
+    if boxes:
+        widest = max(boxes, key=lambda face: boxes[face].width)
+        edges += _rows(widest, boxes[widest], p, 1.0 if widest == TARGET else 1.5)
     return View(tuple(edge for edge in edges if _inside(edge)), frozenset(boxes))
 
 

@@ -2,7 +2,7 @@
 
 Bearing and distance follow from one look; the heading only from how the picture changes over known moves, and from
 the faces beside the Target face. Until looks have decided, several headings are kept side by side (Gaussian sum
-filter: Sorenson and Alspach, Automatica 7, 1971; iterated update: Bell and Cathey, IEEE TAC 38, 1993).
+filter: Sorenson and Alspach, Automatica 7, 1971; iterated update: Bell and Cathey, IEEE TAC 38, 1993; weights of stray edges: Huber, Robust Statistics, 1981).
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
 _ITERATIONS = 6
+_STRAY_SIGMAS = 1.5
 _KEPT_COST = 16.0
 _LIKELY_COST = 16.0
 _GATE_PX = 15.0
@@ -54,7 +55,7 @@ class FilterParameters:
     )
     move_sigma: float = parameter(0.02, "Error of a measured move, share of its length", low=0.0, high=1.0)
     move_floor_m: float = parameter(0.0007, "Error of a measured move, least", unit="m", low=0.0, high=0.1)
-    turn_sigma: float = parameter(0.03, "Error of a measured turn, share of it", low=0.0, high=1.0)
+    turn_sigma: float = parameter(0.06, "Error of a measured turn, share of it", low=0.0, high=1.0)
     yaw_drift_rad: float = parameter(
         0.0022,
         "Turn by slip on a move of 10 cm, which the wheels don't measure; grows with the root of the way",
@@ -272,11 +273,15 @@ class PoseFilter:
         if not edges:
             return
         measured = np.array([edge.position_px for edge in edges])
-        noise = np.diag([edge.sigma_px**2 for edge in edges])
+        sigmas = np.array([edge.sigma_px for edge in edges])
+        noise = np.diag(sigmas**2)
         prior, covariance = hypothesis.state, hypothesis.covariance
         state = prior
-        for _ in range(_ITERATIONS):
+        for number in range(_ITERATIONS):
             h, predicted = self._linearise(state, edges)
+            # Huber's weights: an edge that contradicts the others, as of a broken block, pulls with limited force.
+            strays = np.maximum(1.0, np.abs(measured - predicted) / (_STRAY_SIGMAS * sigmas)) if number else 1.0
+            noise = np.diag(sigmas**2 * strays)
             scatter = h @ covariance @ h.T + noise
             gain = np.linalg.solve(scatter, h @ covariance).T
             change = prior + gain @ (measured - predicted - h @ (prior - state)) - state

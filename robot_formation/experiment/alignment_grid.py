@@ -37,7 +37,8 @@ from robot_formation.world.world import World
 
 PLACES_M = tuple(number * 0.05 for number in range(-9, 10))
 ANGLES_DEG = (-60.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0)
-CONDITIONS = ("world.camera.mode=on_demand", "world.overhead.enabled=false")
+# Nobody has placed the follower in formation by hand here, so that nothing may be assumed of its heading.
+CONDITIONS = ("world.camera.mode=on_demand", "world.overhead.enabled=false", "fine_tuner.precise.placed_m=0.0")
 GOOD_U_M, GOOD_V_M, GOOD_HEADING_RAD, GOOD_MOVES = 0.015, 0.01, math.radians(6.0), 14
 _LEAST_GAP_M = 0.005
 _WIDEST_RAD = math.radians(40.0)
@@ -159,7 +160,7 @@ def run_start(equipment: Equipment, mode: str, start: Start, faces: str, seed: i
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     """Tell the share of good ends, and median and 95 % point of moves, path and absolute errors; SI units."""
-    values = {
+    values: dict[str, list[float]] = {
         "moves": [row.moves for row in rows],
         "path_m": [row.path_m for row in rows],
         "error_u_m": [abs(row.error_u_m) for row in rows],
