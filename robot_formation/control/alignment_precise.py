@@ -160,6 +160,8 @@ class PreciseAlignment:
         """Choose the next motion and say why."""
         p = self._p
         states = self._filter.likely()
+        if not self._approach.apart(state) and (away := self._approach.away(states)) != Motion():
+            return away, "too close: away along u"
         if self._filter.yaw_sigma_rad > _CLUELESS_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
             return self._approach.face(states), "turn towards the marker"
         if searching:

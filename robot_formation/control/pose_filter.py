@@ -2,7 +2,8 @@
 
 Bearing and distance follow from one look; the heading only from how the picture changes over known moves, and from
 the faces beside the Target face. Until looks have decided, several headings are kept side by side (Gaussian sum
-filter: Sorenson and Alspach, Automatica 7, 1971; iterated update: Bell and Cathey, IEEE TAC 38, 1993; weights of stray edges: Huber, Robust Statistics, 1981).
+filter: Sorenson and Alspach, Automatica 7, 1971; iterated update: Bell and Cathey, IEEE TAC 38, 1993; weights of
+stray edges: Huber, Robust Statistics, 1981).
 """
 
 from __future__ import annotations
