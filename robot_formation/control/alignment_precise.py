@@ -175,7 +175,7 @@ class PreciseAlignment:
 
     def _boxes(self, frames: Frames) -> dict[int, Box]:
         last = frames[-self._p.averaged_frames :]
-        return mean_boxes([self._filter.plausible(blocks) for blocks in last] if self._filter.known else last)
+        return mean_boxes([self._filter.plausible(blocks) for blocks in last])
 
     def _placed(self, state: Vector) -> bool:
         return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m

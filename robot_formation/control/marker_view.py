@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box, hulls
@@ -11,6 +11,7 @@ from robot_formation.vision.block import Block
 
 PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX = 316.0, 208.0
 _CUT = 6.0
+_SPLIT_PX = 12.0
 _MARGIN_PX = 5.0
 """An edge nearer to the picture's border may be the border's, not the marker's."""
 
@@ -85,6 +86,19 @@ class View:
 
     edges: tuple[Edge, ...]
     faces: frozenset[int]
+
+
+def one_marker(blocks: Iterable[Block], cost: Callable[[Block], float]) -> list[Block]:
+    """Keep one object of each signature: the block of least cost, and what a split by flicker may have cut off it."""
+    kept: list[Block] = []
+    chosen: dict[int, Block] = {}
+    for block in sorted(blocks, key=cost):
+        first = chosen.setdefault(block.signature, block)
+        gap_x = abs(block.x - first.x) - 0.5 * (block.width + first.width)
+        gap_y = abs(block.y - first.y) - 0.5 * (block.height + first.height)
+        if max(gap_x, gap_y) <= _SPLIT_PX:
+            kept.append(block)
+    return kept
 
 
 def mean_boxes(frames: Sequence[Sequence[Block]]) -> dict[int, Box]:

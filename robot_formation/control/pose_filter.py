@@ -15,7 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
-from robot_formation.control.marker_view import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, sliver, view
+from robot_formation.control.marker_view import (
+    PICTURE_WIDTH_PX,
+    Edge,
+    EdgeParameters,
+    View,
+    hidden,
+    one_marker,
+    sliver,
+    view,
+)
 from robot_formation.control.motion import Motion
 from robot_formation.control.relative_pose import (
     CURVATURE,
@@ -223,12 +232,12 @@ class PoseFilter:
             self._begin(boxes)
 
     def plausible(self, blocks: Sequence[Block]) -> list[Block]:
-        """Leave out blocks that lie where no hypothesis expects their face: distractors of the same colour."""
-        kept = []
-        for block in blocks:
-            if any(self._expects(hypothesis, block) for hypothesis in self.hypotheses):
-                kept.append(block)
-        return kept
+        """Leave out blocks that lie where no hypothesis expects their face: other objects of a marker colour."""
+        if not self.hypotheses:
+            return one_marker(blocks, lambda block: -block.width * block.height)
+        expected = self._model.pixels(self.best.state[None])[0].mean(axis=0)
+        kept = [block for block in blocks if any(self._expects(hypothesis, block) for hypothesis in self.hypotheses)]
+        return one_marker(kept, lambda block: math.hypot(block.x - expected[0], block.y - expected[1]))
 
     def _expects(self, hypothesis: Hypothesis, block: Block) -> bool:
         if block.signature not in FACES:
