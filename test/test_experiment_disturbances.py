@@ -1,12 +1,21 @@
 """Loss of the neighbour and disturbed pictures, each as a script with its outcome: single alignments, and one run."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
+from robot_formation import exit_codes
+from robot_formation.analysis.from_bag import load_run
+from robot_formation.analysis.quantities import analyse
+from robot_formation.bag.reader import read_bag
 from robot_formation.experiment.alignment_grid import equipment
 from robot_formation.experiment.alignment_trial import AlignmentTrial, Start
+from robot_formation.experiment.in_process import run_in_process
+from robot_formation.experiment.scenario import load_track, override
+from robot_formation.vision.detector import BlockDetector
+from robot_formation.vision.tracking import ClockError
 
 LOOK = 22  # frames
 BESIDE = Start(0.36, -0.05, 0.0)
@@ -138,3 +147,55 @@ def test_a_dead_camera_loses_the_neighbour():
     count = iter(range(10**9))
     trial = align(tamper=lambda blocks, stamp_ns: None if next(count) > LOOK + 5 else blocks)
     assert trial.outcome == "lost"
+
+
+# --- whole runs -----------------------------------------------------------------------------------------------------
+
+RUN = ["fine_tuner.mode=precise", "world.camera.mode=on_demand", "world.overhead.enabled=false", "leader.timesteps=4"]
+
+
+def run(tmp_path, monkeypatch, process):
+    """Run with a stand-in for the detector's `process`, which takes the number of the frame and the true blocks."""
+    frames = itertools.count()
+    true_process = BlockDetector.process
+
+    def changed(self, picture, stamp_us):
+        return process(next(frames), true_process(self, picture, stamp_us))
+
+    monkeypatch.setattr(BlockDetector, "process", changed)
+    result = run_in_process(override(load_track("one"), RUN), tmp_path / "run", {})
+    return result, analyse(load_run(result.bag))
+
+
+def states(analysis_or_record):
+    return [state.split(":")[0] for state in analysis_or_record.followers[0].states]
+
+
+def test_a_neighbour_that_vanishes_in_a_run_is_lost_and_the_bag_is_complete(tmp_path, monkeypatch):
+    result, analysis = run(tmp_path, monkeypatch, lambda number, blocks: blocks if number < 12 * LOOK else [])
+    assert result.exit_code == exit_codes.LOST
+    assert analysis.outcome == "lost"
+    assert 1 <= analysis.followers[0].totals["timesteps_finished"] < 4
+    with read_bag(result.bag) as bag:
+        assert not bag.recovered
+
+
+def test_a_neighbour_that_comes_back_in_a_run_is_reacquired(tmp_path, monkeypatch):
+    result, analysis = run(
+        tmp_path, monkeypatch, lambda number, blocks: [] if 5 * LOOK <= number < 9 * LOOK else blocks
+    )
+    assert result.exit_code == exit_codes.DONE
+    assert "reacquired" in states(load_run(result.bag))
+    assert analysis.followers[0].totals["formation_error_rmse_m"] < 0.02
+
+
+def test_a_camera_that_dies_in_a_run_loses_the_neighbour_in_good_order(tmp_path, monkeypatch):
+    def die(number, blocks):
+        if number > 5 * LOOK:
+            raise ClockError("the camera is dead")
+        return blocks
+
+    result, analysis = run(tmp_path, monkeypatch, die)
+    assert result.exit_code == exit_codes.LOST
+    assert analysis.outcome == "lost"
+    assert any("asked for again" in warning for warning in result.warnings)

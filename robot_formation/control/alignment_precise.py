@@ -19,12 +19,12 @@ from robot_formation.parameters import parameter
 
 _SURPRISE = 12.0
 """Mean square of a look's innovations by their scatter from which on something is in the way."""
-_VANTAGES_M = (0.135, -0.135, 0.135, 0.115)
+_VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
-_VANTAGE_BESIDE_M = 0.33
+_VANTAGE_BESIDE_M = 0.305
 _VANTAGE_NEAR = Motion(0.02, 0.03, math.radians(6.0))
 """How far from such a place is near enough."""
-_LAST_MOVES = 5
+_LAST_MOVES = 4
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
 _FIRST_SIDESTEP_SIGMA_M = 0.002
@@ -136,7 +136,7 @@ class PreciseAlignment:
             return decision
         self._search.found()
         first = not self._filter.known
-        self._filter.look(boxes)
+        self._filter.look(boxes, doubt=self._timestep == 0)
         if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             self._vantages = []
@@ -170,7 +170,7 @@ class PreciseAlignment:
                 if motion != Motion():
                     return motion, "to see two faces"
         share = 0.5 if self._timestep > 0 else 0.5 * p.first_share
-        trifle = Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.4 * p.heading_tolerance_rad)
+        trifle = Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
         return self._without_trifles(self._approach.next(states, FORMATION), trifle), "to the formation position"
 
     def _boxes(self, frames: Frames) -> dict[int, Box]:

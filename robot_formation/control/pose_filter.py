@@ -45,6 +45,7 @@ _ITERATIONS = 6
 _STRAY_SIGMAS = 1.5
 _KEPT_COST = 16.0
 _LIKELY_COST = 16.0
+_MISFIT_COST = 30.0
 _GATE_PX = 15.0
 _HYPOTHESES = 14
 FACES = (TARGET, FRONT, REAR)
@@ -220,16 +221,21 @@ class PoseFilter:
 
     # --- looks ------------------------------------------------------------------------------------------------------
 
-    def look(self, boxes: dict[int, Box]) -> None:
-        """Take a look's boxes, at least one."""
+    def look(self, boxes: dict[int, Box], *, doubt: bool = False) -> None:
+        """Take a look's boxes, at least one; with `doubt`, an estimate that they contradict is made anew from them."""
         seen = view(boxes, self._edges)
+        before = self._least() if self.hypotheses else 0.0
         if not self.hypotheses:
             self._begin(boxes)
+        self._take(seen)
+        if not self.hypotheses or (doubt and self._least() - before > _MISFIT_COST):
+            self._begin(boxes)
+            self._take(seen)
+
+    def _take(self, seen: View) -> None:
         for hypothesis in self.hypotheses:
             self._update(hypothesis, seen)
         self._prune()
-        if not self.hypotheses:
-            self._begin(boxes)
 
     def plausible(self, blocks: Sequence[Block]) -> list[Block]:
         """Leave out blocks that lie where no hypothesis expects their face: other objects of a marker colour."""
@@ -266,6 +272,7 @@ class PoseFilter:
     def _begin(self, boxes: dict[int, Box]) -> None:
         face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
         box = boxes[face]
+        self.hypotheses = []
         for degrees in range(-90, 91, 10):
             guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
             ground = [self._p.curvature_sigma_per_m**2, self._p.twist_sigma_rad**2]
