@@ -275,7 +275,7 @@ def test_a_repeated_look_does_not_count_the_frames_of_the_one_before():
     assert script.look([]) == [State("hold"), RequestFrames(FRAMES)]
     for _ in range(3):
         assert script.tuner.frame(IN_PLACE, script.now_ns) == []
-    assert script.look(IN_PLACE) == [State("aligned"), Done(0)]
+    assert script.look(IN_PLACE) == [State("reacquired"), State("aligned"), Done(0)]
 
 
 def test_a_look_whose_blocks_change_is_extended_until_they_are_stable():
@@ -434,6 +434,8 @@ def test_a_leader_that_comes_back_into_view_is_not_lost():
     script.tick(0)
     for _ in range(3):
         assert script.look([]) == [State("hold"), RequestFrames(FRAMES)]
-        assert isinstance(script.look(TOO_FAR_BACK)[1], SendMove)
+        reacquired, _, move = script.look(TOO_FAR_BACK)
+        assert reacquired == State("reacquired")
+        assert isinstance(move, SendMove)
         script.moved(Motion(0.01))
     assert script.look(IN_PLACE) == [State("aligned"), Done(0)]

@@ -91,7 +91,7 @@ def _evaluate(
     from robot_formation.analysis.vision_areas_figure import draw_areas
     from robot_formation.analysis.vision_curve_figures import draw_pan, draw_side
     from robot_formation.analysis.vision_report import VisionResult
-    from robot_formation.bag.writer import PARTIAL_SUFFIX
+    from robot_formation.bag.place import PARTIAL_SUFFIX
     from robot_formation.control.edge_bias import edge_biases
     from robot_formation.control.vision_calibration import VisionCalibration, save_vision
     from robot_formation.control.vision_fit import face_views, fit_camera

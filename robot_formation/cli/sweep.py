@@ -16,10 +16,11 @@ from robot_formation import exit_codes
 from robot_formation.errors import FormationError
 
 DESCRIPTION = """\
-Run every combination of tracks, surfaces, predictors and seeds in process (fine-tuner in mode 'paper', camera on
-demand), and compare the predictors: medians with 95 % bootstrap intervals, paired over seeds. The table of runs grows
-in OUT/runs.csv; a sweep that was stopped goes on there when the same command is given again. Besides the predictors of
-'formation list', 'ideal' and 'ideal+close' show the noise floor: the same controller, commanded the ideal move.
+Run every combination of tracks, surfaces, predictors and seeds in process (camera on demand; fine-tuner in mode
+'paper', unless --set fine_tuner.mode=precise), and compare the predictors: medians with 95 % bootstrap intervals,
+paired over seeds. The table of runs grows in OUT/runs.csv; a sweep that was stopped goes on there when the same command
+is given again. Besides the predictors of 'formation list', 'ideal' and 'ideal+close' show the noise floor: the same
+controller, commanded the ideal move.
 """
 SUMMARY_NAME = "summary.json"
 TABLE_NAME = "summary.md"

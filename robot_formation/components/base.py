@@ -53,6 +53,8 @@ class Component:
 
     fixed: ClassVar[Mapping[str, str]] = {"*": "a run's results rest on it from the start on"}
     """Which parameters can't be set after the start, by shell pattern, and why; `set_parameters` takes the others."""
+    patience_s = 0.0
+    """Wall time without any message after which a host calls `stalled`, seconds; 0: never."""
 
     def __init__(self, place: Place) -> None:
         self.place = place
@@ -106,6 +108,9 @@ class Component:
 
     def work(self) -> None:
         """Do the next piece of what is owed."""
+
+    def stalled(self) -> None:
+        """Do something about it that nothing comes any more."""
 
     def close(self) -> None:
         """Give back what the component holds; called once, at the end."""

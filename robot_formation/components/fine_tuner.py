@@ -32,6 +32,7 @@ class FineTunerComponent(Component):
     def __init__(self, parameters: FineTunerNodeParameters, place: Place) -> None:
         super().__init__(place)
         self._tuner = core.FineTuner(calibrated(parameters))
+        self.patience_s = parameters.look.patience_s
         self._neighbour = names.formation_done(names.beacon_neighbour(place.robot), place.formation)
         listeners = ("leader", "fine_tuner")[: parameters.done_listeners]
         self._done = names.formation_done(place.robot, place.formation, listeners=listeners)
@@ -57,6 +58,10 @@ class FineTunerComponent(Component):
             names.ALIGNMENT,
             self._done,
         ]
+
+    def stalled(self) -> None:
+        """See `Component`: frames that don't come are asked for again, up to a bound."""
+        self._act(self._tuner.stalled())
 
     def details(self) -> dict[str, str]:
         """See `Component`."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from robot_formation.control.alignment import TARGET, Box, Decision, Verdict
 from robot_formation.control.alignment_modes import Frames
-from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, way_to
+from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, legs, way_to
 from robot_formation.control.drive_experience import DriveExperience
 from robot_formation.control.leader_search import LeaderSearch, SearchParameters
 from robot_formation.control.marker_view import EdgeParameters, mean_boxes
@@ -18,11 +19,15 @@ from robot_formation.parameters import parameter
 
 _SURPRISE = 12.0
 """Mean square of a look's innovations by their scatter from which on something is in the way."""
-_VANTAGES_M = (0.14, 0.11, -0.11, -0.14, -0.125, 0.125, 0.15, -0.15)
-_VANTAGE_BESIDE_M = 0.33
-_LAST_MOVES = 5
+_VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
+"""Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
+_VANTAGE_BESIDE_M = 0.305
+_VANTAGE_NEAR = Motion(0.02, 0.03, math.radians(6.0))
+"""How far from such a place is near enough."""
+_LAST_MOVES = 4
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
+_FIRST_SIDESTEP_SIGMA_M = 0.002
 
 
 @dataclass(frozen=True)
@@ -37,8 +42,11 @@ class PreciseParameters:
     turn_rad: float = parameter(
         math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
     )
+    first_share: float = parameter(
+        0.6, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
+    )
     certain_rad: float = parameter(
-        math.radians(0.6),
+        math.radians(0.65),
         "Standard deviation of the heading that ends the first alignment",
         unit="rad",
         low=1e-3,
@@ -80,7 +88,7 @@ class PreciseAlignment:
         self._moves = 0
         self._timestep = 0
         self._last = Motion()
-        self._vantages: list[float] = []
+        self._vantages: list[float] | None = None  # those still to be visited; None: not chosen yet
 
     def restart(self, timestep: int) -> None:
         """Begin a timestep: the neighbour has made its step."""
@@ -88,7 +96,11 @@ class PreciseAlignment:
         self._timestep = timestep
         self._last = Motion()
         if timestep > 0:
-            self._filter.neighbour_stepped(Motion(self._step_m, self._experience.slip * self._step_m))
+            self._filter.neighbour_stepped(
+                Motion(self._step_m, self._experience.slip * self._step_m),
+                self._experience.overshoot,
+                None if self._experience.drives else _FIRST_SIDESTEP_SIGMA_M,
+            )
 
     def turn_before(self, frames: Frames) -> float:
         """Look before the prediction move; returns the turn [rad] that goes with it."""
@@ -119,70 +131,83 @@ class PreciseAlignment:
             self._filter.forget()
             strange = False
         if not boxes or strange:
-            return self._search.missed(self._last if self._moves else Motion(), self.offset())
+            decision = self._search.missed(self._last if self._moves else Motion(), self.offset())
+            self._moves += legs(decision.motion)
+            return decision
         self._search.found()
         first = not self._filter.known
-        self._filter.look(boxes)
+        self._filter.look(boxes, doubt=self._timestep == 0)
         if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
+            self._vantages = []
         return self._correct()
 
     def _correct(self) -> Decision:
         p, state = self._p, self._filter.best.state
         unsure = self._filter.yaw_sigma_rad > p.certain_rad
-        searching = unsure and self._timestep == 0 and self._moves < p.max_moves - _LAST_MOVES
+        searching = unsure and self._timestep == 0 and self._moves < p.max_moves - _LAST_MOVES and self._vantages != []
         if not searching and self._within(way_to(state, FORMATION)):
             return Decision(Verdict.ALIGNED, reason="inside the tolerances")
-        if self._moves >= p.max_moves:
-            return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
         motion, reason = self._next(state, searching)
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
-        self._moves += 1
+        if self._moves + legs(motion) > p.max_moves:
+            return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
+        self._moves += legs(motion)
         return Decision(Verdict.MOVE, self._experience.compensated(motion), reason)
 
     def _next(self, state: Vector, searching: bool) -> tuple[Motion, str]:
         """Choose the next motion and say why."""
+        p = self._p
         states = self._filter.likely()
+        if not self._approach.apart(state) and (away := self._approach.away(states)) != Motion():
+            return away, "too close: away along u"
         if self._filter.yaw_sigma_rad > _CLUELESS_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
             return self._approach.face(states), "turn towards the marker"
         if searching:
-            return self._without_trifles(self._approach.next(states, self._vantage(state))), "to see two faces"
-        return self._without_trifles(self._approach.next(states, FORMATION)), "to the formation position"
+            for vantage in self._places(state):
+                motion = self._without_trifles(self._approach.next(states, vantage), _VANTAGE_NEAR)
+                if motion != Motion():
+                    return motion, "to see two faces"
+        share = 0.5 if self._timestep > 0 else 0.5 * p.first_share
+        trifle = Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
+        return self._without_trifles(self._approach.next(states, FORMATION), trifle), "to the formation position"
 
     def _boxes(self, frames: Frames) -> dict[int, Box]:
         last = frames[-self._p.averaged_frames :]
-        return mean_boxes([self._filter.plausible(blocks) for blocks in last] if self._filter.known else last)
+        return mean_boxes([self._filter.plausible(blocks) for blocks in last])
 
     def _placed(self, state: Vector) -> bool:
         return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m
 
     def _within(self, way: Motion) -> bool:
         p = self._p
+        share = 1.0 if self._timestep > 0 else p.first_share
         return (
-            abs(way.y_m) <= p.u_tolerance_m
-            and abs(way.x_m) <= p.v_tolerance_m
+            abs(way.y_m) <= share * p.u_tolerance_m
+            and abs(way.x_m) <= share * p.v_tolerance_m
             and abs(way.yaw_rad) <= p.heading_tolerance_rad
         )
 
-    def _without_trifles(self, motion: Motion) -> Motion:
+    @staticmethod
+    def _without_trifles(motion: Motion, trifle: Motion) -> Motion:
         """Leave out legs that are hardly worth a move."""
-        p = self._p
         c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
         x, y = c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m
-        yaw = motion.yaw_rad if abs(motion.yaw_rad) > 0.4 * p.heading_tolerance_rad else 0.0
-        x = x if abs(x) > 0.5 * p.v_tolerance_m else 0.0
-        y = y if abs(y) > 0.5 * p.u_tolerance_m else 0.0
+        yaw = motion.yaw_rad if abs(motion.yaw_rad) > trifle.yaw_rad else 0.0
+        x = x if abs(x) > trifle.x_m else 0.0
+        y = y if abs(y) > trifle.y_m else 0.0
         c, s = math.cos(yaw), math.sin(yaw)
         return Motion(c * x - s * y, s * x + c * y, yaw)
 
-    def _vantage(self, state: Vector) -> Motion:
-        """A place behind or ahead from where a second face shows: twice on the near side, then on the other.
+    def _places(self, state: Vector) -> Iterator[Motion]:
+        """Yield the places left to look from, behind and ahead in turn; the one that is asked beyond is done with.
 
         The outer edges of Front and Rear are biased alike, so that the two sides' errors in heading cancel.
         """
-        if not self._vantages:
+        if self._vantages is None:
             behind = way_to(state, Motion()).x_m > 0.0
             self._vantages = [-place if behind else place for place in _VANTAGES_M]
-        place = self._vantages.pop(0)
-        return Motion(place, -_VANTAGE_BESIDE_M, 0.0)
+        while self._vantages:
+            yield Motion(self._vantages[0], -_VANTAGE_BESIDE_M, 0.0)
+            self._vantages.pop(0)

@@ -21,6 +21,7 @@ _HIDDEN_COST_M = 0.25
 _DETOUR_COST_M = 0.3
 _TURN_COST_M_PER_RAD = 0.15
 _PATH_POINTS = 5
+_AWAY_M = 0.05
 _ROUNDING_M = 1e-6
 _COMPENSATION_M = 0.008
 
@@ -76,6 +77,11 @@ class Approach:
             if all(self._clear(state, motion) for state in states):
                 return motion
         return Motion()
+
+    def away(self, states: Sequence[Vector]) -> Motion:
+        """Step aside from a neighbour that is too close; no motion if that brings the bodies nearer."""
+        motion = Motion(y_m=-_AWAY_M)
+        return motion if all(self._clear(state, motion) for state in states) else Motion()
 
     def apart(self, state: Vector) -> bool:
         """Whether the bodies keep their distance."""

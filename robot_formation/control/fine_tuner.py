@@ -31,6 +31,13 @@ class LookParameters:
     max_requests: int = parameter(
         3, "Requests for frames that don't come before the camera counts as dead", low=0, high=100
     )
+    patience_s: float = parameter(
+        60.0,
+        "Wall time without a message after which missing frames are asked for; 0: never",
+        unit="s",
+        low=0.0,
+        high=1e6,
+    )
     max_extensions: int = parameter(3, "Extensions of a look before its last frame is taken as it is", low=0, high=100)
 
 

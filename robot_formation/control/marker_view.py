@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box, hulls
 from robot_formation.parameters import parameter
@@ -11,6 +11,7 @@ from robot_formation.vision.block import Block
 
 PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX = 316.0, 208.0
 _CUT = 6.0
+_SPLIT_PX = 12.0
 _MARGIN_PX = 5.0
 """An edge nearer to the picture's border may be the border's, not the marker's."""
 
@@ -37,15 +38,25 @@ class EdgeParameters:
     )
     column_sigma_px: float = parameter(0.7, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
     far_column_sigma_px: float = parameter(
-        1.3, "Scatter of the outer edges of Front and Rear", unit="px", low=0.01, high=20.0
+        0.9, "Scatter of the outer edges of Front and Rear of middling width", unit="px", low=0.01, high=20.0
     )
-    sliver_sigma_px: float = parameter(
-        2.5,
-        "Scatter of the Target block's right edge beside a Front face too narrow to be reported",
+    poor_column_sigma_px: float = parameter(
+        1.7,
+        "Scatter of the outer edges of Front and Rear where they are narrow or wide",
         unit="px",
         low=0.01,
-        high=50.0,
+        high=20.0,
     )
+    wide_px: float = parameter(20.0, "Reported width from which on they are wide", unit="px", low=0.0, high=300.0)
+    sliver_px: float = parameter(
+        4.8,
+        "Bias of the Target block's right edge beside a Front face too narrow to be reported",
+        unit="px",
+        low=-20.0,
+        high=20.0,
+    )
+    sliver_from_px: float = parameter(3.0, "Width of that face at which it begins", unit="px", low=0.0, high=50.0)
+    sliver_to_px: float = parameter(6.5, "Width of that face from which on it is full", unit="px", low=0.0, high=50.0)
     row_sigma_px: float = parameter(0.45, "Scatter of upper and lower edges", unit="px", low=0.01, high=20.0)
     front_shows_px: float = parameter(
         9.0, "Width from which on the Front face is always reported", unit="px", low=1.0, high=100.0
@@ -77,6 +88,19 @@ class View:
     faces: frozenset[int]
 
 
+def one_marker(blocks: Iterable[Block], cost: Callable[[Block], float]) -> list[Block]:
+    """Keep one object of each signature: the block of least cost, and what a split by flicker may have cut off it."""
+    kept: list[Block] = []
+    chosen: dict[int, Block] = {}
+    for block in sorted(blocks, key=cost):
+        first = chosen.setdefault(block.signature, block)
+        gap_x = abs(block.x - first.x) - 0.5 * (block.width + first.width)
+        gap_y = abs(block.y - first.y) - 0.5 * (block.height + first.height)
+        if max(gap_x, gap_y) <= _SPLIT_PX:
+            kept.append(block)
+    return kept
+
+
 def mean_boxes(frames: Sequence[Sequence[Block]]) -> dict[int, Box]:
     """Average each face's box over the frames that report the faces which the last frame reports."""
     last = set(hulls(frames[-1])) if frames else set()
@@ -97,11 +121,11 @@ def _mean(boxes: Sequence[Box]) -> Box:
 def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
     """Take the edges that can be trusted out of a look's boxes.
 
-    Where two faces meet, the one on the right tells the common edge: the detector's rows are exact there only. Front
-    and Rear give columns only beside a Target block: their slivers are often broken up in height.
+    Where two faces meet, the one on the right tells the common edge: the detector's rows are exact there only. The
+    rows are those of the widest face: a sliver is often broken up in height.
     """
     edges: list[Edge] = []
-    near, far = p.column_sigma_px, p.far_column_sigma_px
+    near = p.column_sigma_px
     target, front, rear = boxes.get(TARGET), boxes.get(FRONT), boxes.get(REAR)
     if target is not None:
         # The detector begins a row's earlier segments one cell late.
@@ -109,18 +133,18 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
         edges.append(Edge(TARGET, "left", target.left - p.target_left_px - late, sigma))
         if front is None:
             edges.append(Edge(TARGET, "right", target.right - p.target_right_px, near))
-        edges += _rows(TARGET, target, p, 1.0)
     if front is not None:
         edges.append(Edge(FRONT, "left", front.left - p.front_left_px, near))
         narrow = front.width < p.narrow_px
         bias = p.narrow_right_px if narrow else p.front_right_px
-        edges.append(Edge(FRONT, "right", front.right - bias, 1.5 * far if narrow else far))
-        edges += _rows(FRONT, front, p, 2.0) if target is None else []
+        edges.append(Edge(FRONT, "right", front.right - bias, _far(front, p)))
     if rear is not None:
-        edges.append(Edge(REAR, "left", rear.left - p.rear_left_px, far))
+        edges.append(Edge(REAR, "left", rear.left - p.rear_left_px, _far(rear, p)))
         if target is None:
-            edges.append(Edge(REAR, "right", rear.right - p.rear_right_px, far))
-            edges += _rows(REAR, rear, p, 2.0)
+            edges.append(Edge(REAR, "right", rear.right - p.rear_right_px, _far(rear, p)))
+    if boxes:
+        widest = max(boxes, key=lambda face: boxes[face].width)
+        edges += _rows(widest, boxes[widest], p, 1.0 if widest == TARGET else 1.5)
     return View(tuple(edge for edge in edges if _inside(edge)), frozenset(boxes))
 
 
@@ -129,6 +153,19 @@ def hidden(view: View, p: EdgeParameters) -> Iterable[Edge]:
     for face, width in ((FRONT, p.front_shows_px), (REAR, p.rear_shows_px), (TARGET, p.front_shows_px)):
         if face not in view.faces:
             yield Edge(face, "width", width, p.hidden_sigma_px)
+
+
+def sliver(edge: Edge, front_px: float, p: EdgeParameters) -> Edge:
+    """Correct the Target block's right edge for a Front face of this true width that is not reported."""
+    share = min(1.0, max(0.0, (front_px - p.sliver_from_px) / max(p.sliver_to_px - p.sliver_from_px, 1e-6)))
+    # Halfway, a little noise decides.
+    sigma = edge.sigma_px + p.sliver_px * 2.0 * share * (1.0 - share)
+    return replace(edge, position_px=edge.position_px - p.sliver_px * share, sigma_px=sigma)
+
+
+def _far(box: Box, p: EdgeParameters) -> float:
+    middling = p.narrow_px <= box.width < p.wide_px
+    return p.far_column_sigma_px if middling else p.poor_column_sigma_px
 
 
 def _rows(face: int, box: Box, p: EdgeParameters, scale: float) -> Iterable[Edge]:

@@ -2,19 +2,29 @@
 
 Bearing and distance follow from one look; the heading only from how the picture changes over known moves, and from
 the faces beside the Target face. Until looks have decided, several headings are kept side by side (Gaussian sum
-filter: Sorenson and Alspach, Automatica 7, 1971; iterated update: Bell and Cathey, IEEE TAC 38, 1993).
+filter: Sorenson and Alspach, Automatica 7, 1971; iterated update: Bell and Cathey, IEEE TAC 38, 1993; weights of
+stray edges: Huber, Robust Statistics, 1981).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
-from robot_formation.control.marker_view import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, view
+from robot_formation.control.marker_view import (
+    PICTURE_WIDTH_PX,
+    Edge,
+    EdgeParameters,
+    View,
+    hidden,
+    one_marker,
+    sliver,
+    view,
+)
 from robot_formation.control.motion import Motion
 from robot_formation.control.relative_pose import (
     CURVATURE,
@@ -32,8 +42,10 @@ from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
 _ITERATIONS = 6
+_STRAY_SIGMAS = 1.5
 _KEPT_COST = 16.0
 _LIKELY_COST = 16.0
+_MISFIT_COST = 30.0
 _GATE_PX = 15.0
 _HYPOTHESES = 14
 FACES = (TARGET, FRONT, REAR)
@@ -54,7 +66,7 @@ class FilterParameters:
     )
     move_sigma: float = parameter(0.02, "Error of a measured move, share of its length", low=0.0, high=1.0)
     move_floor_m: float = parameter(0.0007, "Error of a measured move, least", unit="m", low=0.0, high=0.1)
-    turn_sigma: float = parameter(0.03, "Error of a measured turn, share of it", low=0.0, high=1.0)
+    turn_sigma: float = parameter(0.06, "Error of a measured turn, share of it", low=0.0, high=1.0)
     yaw_drift_rad: float = parameter(
         0.0022,
         "Turn by slip on a move of 10 cm, which the wheels don't measure; grows with the root of the way",
@@ -69,11 +81,25 @@ class FilterParameters:
         0.0007, "How far the neighbour's step leads aside from its heading", unit="m", low=0.0, high=1.0
     )
     slip_per_lean: float = parameter(
-        1.0,
+        0.76,
         "Sideways slip of a driving robot: share of its way per radian of lateral slope",
         unit="1/rad",
         low=0.0,
         high=100.0,
+    )
+    slip_growth: float = parameter(
+        12.0,
+        "How much that grows on the way down, per squared share by which drives go too far there",
+        unit="1/rad",
+        low=0.0,
+        high=1000.0,
+    )
+    turn_growth: float = parameter(
+        22.0,
+        "Relative turn by slip on the way down: per way, lean and squared share by which drives go too far",
+        unit="1/(m rad)",
+        low=0.0,
+        high=1000.0,
     )
     neighbour_turn_sigma_rad: float = parameter(
         0.002, "How far the neighbour turns by slip in its step", unit="rad", low=0.0, high=1.0
@@ -162,21 +188,32 @@ class PoseFilter:
         hypothesis.state = moved
         hypothesis.covariance = jacobian @ hypothesis.covariance @ jacobian.T + swing @ noise @ swing.T
 
-    def neighbour_stepped(self, step: Motion) -> None:
-        """Take that the neighbour has made a step of about this size in its own frame."""
+    def neighbour_stepped(self, step: Motion, overshoot: float = 0.0, sidestep_sigma_m: float | None = None) -> None:
+        """Take that the neighbour has made a step of about this size in its own frame.
+
+        Args:
+            step: its way ahead, and aside if it slips as the follower does.
+            overshoot: how much farther than asked for the robots drive here, share of the way.
+            sidestep_sigma_m: how certain the way aside is; by default as in the parameters.
+        """
         p = self._p
+        overshoot = max(0.0, overshoot)
+        slip = p.slip_per_lean + p.slip_growth * overshoot**2
+        sidestep = p.neighbour_sidestep_sigma_m if sidestep_sigma_m is None else sidestep_sigma_m
         for hypothesis in self.hypotheses:
             state, covariance = hypothesis.state, hypothesis.covariance
             c, s = math.cos(state[YAW]), math.sin(state[YAW])
             along = np.array([[c, -s], [s, c]])
             # The neighbour slips as the follower does, and by as much more as it leans more.
-            aside = step.y_m - p.slip_per_lean * state[CURVATURE] * state[Y] * abs(step.x_m)
+            aside = step.y_m - slip * state[CURVATURE] * state[Y] * abs(step.x_m)
             jacobian = np.eye(SIZE)
             jacobian[:2, YAW] = along @ (-aside, step.x_m)
             hypothesis.state = state.copy()
             hypothesis.state[:2] += along @ (step.x_m, aside)
+            lean = state[CURVATURE] * state[Y]
+            hypothesis.state[YAW] += p.turn_growth * overshoot**2 * lean * abs(step.x_m)
             noise = np.zeros((SIZE, SIZE))
-            noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, p.neighbour_sidestep_sigma_m**2]) @ along.T
+            noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, sidestep**2]) @ along.T
             noise[YAW, YAW] = p.neighbour_turn_sigma_rad**2
             noise[CURVATURE, CURVATURE] = p.curvature_drift_per_m**2
             noise[TWIST, TWIST] = (0.2 * p.twist_sigma_rad) ** 2
@@ -184,24 +221,29 @@ class PoseFilter:
 
     # --- looks ------------------------------------------------------------------------------------------------------
 
-    def look(self, boxes: dict[int, Box]) -> None:
-        """Take a look's boxes, at least one."""
+    def look(self, boxes: dict[int, Box], *, doubt: bool = False) -> None:
+        """Take a look's boxes, at least one; with `doubt`, an estimate that they contradict is made anew from them."""
         seen = view(boxes, self._edges)
+        before = self._least() if self.hypotheses else 0.0
         if not self.hypotheses:
             self._begin(boxes)
+        self._take(seen)
+        if not self.hypotheses or (doubt and self._least() - before > _MISFIT_COST):
+            self._begin(boxes)
+            self._take(seen)
+
+    def _take(self, seen: View) -> None:
         for hypothesis in self.hypotheses:
             self._update(hypothesis, seen)
         self._prune()
-        if not self.hypotheses:
-            self._begin(boxes)
 
     def plausible(self, blocks: Sequence[Block]) -> list[Block]:
-        """Leave out blocks that lie where no hypothesis expects their face: distractors of the same colour."""
-        kept = []
-        for block in blocks:
-            if any(self._expects(hypothesis, block) for hypothesis in self.hypotheses):
-                kept.append(block)
-        return kept
+        """Leave out blocks that lie where no hypothesis expects their face: other objects of a marker colour."""
+        if not self.hypotheses:
+            return one_marker(blocks, lambda block: -block.width * block.height)
+        expected = self._model.pixels(self.best.state[None])[0].mean(axis=0)
+        kept = [block for block in blocks if any(self._expects(hypothesis, block) for hypothesis in self.hypotheses)]
+        return one_marker(kept, lambda block: math.hypot(block.x - expected[0], block.y - expected[1]))
 
     def _expects(self, hypothesis: Hypothesis, block: Block) -> bool:
         if block.signature not in FACES:
@@ -230,6 +272,7 @@ class PoseFilter:
     def _begin(self, boxes: dict[int, Box]) -> None:
         face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
         box = boxes[face]
+        self.hypotheses = []
         for degrees in range(-90, 91, 10):
             guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
             ground = [self._p.curvature_sigma_per_m**2, self._p.twist_sigma_rad**2]
@@ -247,11 +290,15 @@ class PoseFilter:
         if not edges:
             return
         measured = np.array([edge.position_px for edge in edges])
-        noise = np.diag([edge.sigma_px**2 for edge in edges])
+        sigmas = np.array([edge.sigma_px for edge in edges])
+        noise = np.diag(sigmas**2)
         prior, covariance = hypothesis.state, hypothesis.covariance
         state = prior
-        for _ in range(_ITERATIONS):
+        for number in range(_ITERATIONS):
             h, predicted = self._linearise(state, edges)
+            # Huber's weights: an edge that contradicts the others, as of a broken block, pulls with limited force.
+            strays = np.maximum(1.0, np.abs(measured - predicted) / (_STRAY_SIGMAS * sigmas)) if number else 1.0
+            noise = np.diag(sigmas**2 * strays)
             scatter = h @ covariance @ h.T + noise
             gain = np.linalg.solve(scatter, h @ covariance).T
             change = prior + gain @ (measured - predicted - h @ (prior - state)) - state
@@ -269,11 +316,11 @@ class PoseFilter:
         hypothesis.cost += self._contradiction(state, seen)
 
     def _trusted(self, state: Vector, seen: View) -> list[Edge]:
-        """List the edges; a sliver of the Front face may shift the Target block's right one."""
-        sliver = FRONT not in seen.faces and self._model.widths(state)[FRONT] > 0.0
-        sigma = self._edges.sliver_sigma_px
+        """List the edges; a Front face that is not reported may shift the Target block's right one."""
+        if FRONT in seen.faces or (front_px := self._model.widths(state)[FRONT]) <= 0.0:
+            return list(seen.edges)
         return [
-            replace(edge, sigma_px=sigma) if sliver and (edge.face, edge.side) == (TARGET, "right") else edge
+            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (TARGET, "right") else edge
             for edge in seen.edges
         ]
 

@@ -25,6 +25,7 @@ from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 from robot_formation.surface import Surface
 from robot_formation.vision.block import Block
 from robot_formation.vision.detector import BlockDetector
+from robot_formation.vision.picture import Picture
 from robot_formation.world.events import Frame, JointStates, RobotPose
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
@@ -89,7 +90,15 @@ def poses(surface: Surface, start: Start) -> tuple[RobotStart, RobotStart]:
 
 
 class AlignmentTrial:
-    """Runs one trial; `blocks_of` may stand between detector and fine-tuner, and drop a frame by returning None."""
+    """Runs one trial.
+
+    Args:
+        equipment: world, drive, detector and fine-tuner.
+        start: where the follower begins.
+        seed: of every random stream.
+        tamper: stands between detector and fine-tuner: takes blocks and stamp [ns], drops a frame by returning None.
+        spoil: stands between camera and detector: takes a picture and the number of the frame, returns a picture.
+    """
 
     def __init__(
         self,
@@ -97,12 +106,15 @@ class AlignmentTrial:
         start: Start,
         seed: int,
         tamper: Callable[[Sequence[Block], int], Sequence[Block] | None] | None = None,
+        spoil: Callable[[Picture, int], Picture] | None = None,
     ) -> None:
         self._world = World(equipment.surface, poses(equipment.surface, start), equipment.world, seed=seed)
         self._drive = Drive(equipment.drive)
         self._detector = BlockDetector(equipment.detector.load(), equipment.detector)
         self._tuner = FineTuner(equipment.fine_tuner)
         self._tamper = tamper
+        self._spoil = spoil
+        self._frames = 0
         self._actions: deque[Action] = deque()
         self._chassis = equipment.world.chassis
         self._leader = self._world.ground_truth(names.LEADER).pose
@@ -115,6 +127,8 @@ class AlignmentTrial:
             while self._actions:
                 if self._act(self._actions.popleft()):
                     break
+                if not self._actions:
+                    self._actions.extend(self._tuner.stalled())
             self._judge()
         finally:
             self._world.close()
@@ -165,7 +179,9 @@ class AlignmentTrial:
             for event in events:
                 if not isinstance(event, Frame):
                     continue
-                blocks: Sequence[Block] | None = self._detector.process(event.image, event.stamp_ns // 1000)
+                picture = event.image if self._spoil is None else self._spoil(event.image, self._frames)
+                self._frames += 1
+                blocks: Sequence[Block] | None = self._detector.process(picture, event.stamp_ns // 1000)
                 if self._tamper is not None:
                     blocks = self._tamper(blocks or [], event.stamp_ns)
                 if blocks is not None:

@@ -83,6 +83,10 @@ class InProcessRun:
                 code, reason = max((component.exit_code or 0, component.exit_reason) for component in ended)
                 return code, reason if code else ""
             if not world.busy:
+                for hosted in self._hosted:
+                    hosted.component.stalled()
+                if self._queue or any(h.component.exit_code is not None for h in self._hosted):
+                    continue
                 last = f"; last warning: {self.warnings[-1]}" if self.warnings else ""
                 raise RunError(f"the run stands still: everybody waits for somebody{last}")
             world.work()

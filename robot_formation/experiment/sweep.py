@@ -26,7 +26,7 @@ from robot_formation.koopman.predictors import NAMES
 from robot_formation.parameters import suggestion
 from robot_formation.surface import SURFACES
 
-# The comparison's common ground: the paper's fine-tuner, and pictures only when one is waited for.
+# The comparison's common ground unless --set says otherwise: the paper's fine-tuner, pictures only when waited for.
 CONDITIONS = ("fine_tuner.mode=paper", "world.camera.mode=on_demand", "world.overhead.enabled=false")
 RUNS_NAME = "runs.csv"
 PLAN_NAME = "sweep.json"

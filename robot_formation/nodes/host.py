@@ -117,6 +117,7 @@ class Host:
         self._component.attach(self._outbox.send, self._say)
         self._delays = random.Random(os.getpid())
         self._publishers: dict[names.Topic, Any] = {}
+        self._heard_s = time.monotonic()
         self._connect()
 
     def _connect(self) -> None:
@@ -126,7 +127,7 @@ class Host:
             self._publishers[topic] = publisher
             self._outbox.add(topic, publisher)
         for entry in self._component.inputs():
-            topic, handler = entry.topic, self._delayed(entry.handler)
+            topic, handler = entry.topic, self._heard(self._delayed(entry.handler))
             # Volatile: a node that joins late must not act on what was said before.
             qos = qos_profile(replace(topic.qos, durability="volatile"))
             node.create_subscription(conversions.message_class(topic.type), topic.name, handler, qos)
@@ -140,6 +141,8 @@ class Host:
         )
         # Wall time: with use_sim_time a node's own clock stands while nobody moves.
         node.create_timer(_DIAGNOSTICS_S, self._publish_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        if self._component.patience_s > 0.0:
+            node.create_timer(_DIAGNOSTICS_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def run(self) -> int:
         """Spin until the component finishes or a signal comes; then make sure that everything sent has arrived."""
@@ -166,6 +169,20 @@ class Host:
             executor.shutdown()
             component.close()
         return component.exit_code or 0
+
+    def _heard(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
+        def noted(message: Any) -> None:
+            self._heard_s = time.monotonic()
+            handler(message)
+
+        return noted
+
+    def _watch(self) -> None:
+        """Watchdog: tell a component that has heard nothing for so long."""
+        now = time.monotonic()
+        if now - self._heard_s > self._component.patience_s and self._component.exit_code is None:
+            self._heard_s = now
+            self._component.stalled()
 
     def _delayed(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
         longest = self._parameters.callback_delay_s
