@@ -21,8 +21,8 @@ _SURPRISE = 12.0
 """Mean square of a look's innovations by their scatter from which on something is in the way."""
 _VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
-_VANTAGE_BESIDE_M = 0.305
-_VANTAGE_NEAR = Motion(0.02, 0.03, math.radians(6.0))
+_VANTAGE_BESIDE_M = 0.32
+_VANTAGE_NEAR = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
 _LAST_MOVES = 4
 _CLUELESS_RAD = 0.08
