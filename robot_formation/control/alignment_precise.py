@@ -21,10 +21,10 @@ _SURPRISE = 12.0
 """Mean square of a look's innovations by their scatter from which on something is in the way."""
 _VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
-_VANTAGE_BESIDE_M = 0.32
+_VANTAGE_BESIDE_M = 0.312
 _VANTAGE_NEAR = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
-_LAST_MOVES = 4
+_LAST_MOVES = 5
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
 _FIRST_SIDESTEP_SIGMA_M = 0.002
@@ -46,7 +46,7 @@ class PreciseParameters:
         0.7, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
     )
     certain_rad: float = parameter(
-        math.radians(0.65),
+        math.radians(0.8),
         "Standard deviation of the heading that ends the first alignment",
         unit="rad",
         low=1e-3,
