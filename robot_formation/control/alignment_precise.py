@@ -21,10 +21,10 @@ _SURPRISE = 12.0
 """Mean square of a look's innovations by their scatter from which on something is in the way."""
 _VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
-_VANTAGE_BESIDE_M = 0.305
-_VANTAGE_NEAR = Motion(0.02, 0.03, math.radians(6.0))
+_VANTAGE_BESIDE_M = 0.312
+_VANTAGE_NEAR = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
-_LAST_MOVES = 4
+_LAST_MOVES = 5
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
 _FIRST_SIDESTEP_SIGMA_M = 0.002
@@ -35,7 +35,7 @@ class PreciseParameters:
     """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
 
     u_tolerance_m: float = parameter(0.007, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
-    v_tolerance_m: float = parameter(0.006, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    v_tolerance_m: float = parameter(0.005, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
     heading_tolerance_rad: float = parameter(
         math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
     )
@@ -43,10 +43,10 @@ class PreciseParameters:
         math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
     )
     first_share: float = parameter(
-        0.6, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
+        0.7, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
     )
     certain_rad: float = parameter(
-        math.radians(0.65),
+        math.radians(0.8),
         "Standard deviation of the heading that ends the first alignment",
         unit="rad",
         low=1e-3,

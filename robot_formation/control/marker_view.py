@@ -36,7 +36,7 @@ class EdgeParameters:
     rear_right_px: float = parameter(
         0.1, "Bias of its right edge where no Target block follows", unit="px", low=-20.0, high=20.0
     )
-    column_sigma_px: float = parameter(0.7, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
+    column_sigma_px: float = parameter(0.9, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
     far_column_sigma_px: float = parameter(
         0.9, "Scatter of the outer edges of Front and Rear of middling width", unit="px", low=0.01, high=20.0
     )

@@ -78,7 +78,7 @@ class FilterParameters:
         0.02, "How far the neighbour's step may differ from the last one", unit="m", low=0.0, high=1.0
     )
     neighbour_sidestep_sigma_m: float = parameter(
-        0.0007, "How far the neighbour's step leads aside from its heading", unit="m", low=0.0, high=1.0
+        0.0005, "How far the neighbour's step leads aside from its heading", unit="m", low=0.0, high=1.0
     )
     slip_per_lean: float = parameter(
         0.76,
@@ -95,14 +95,14 @@ class FilterParameters:
         high=1000.0,
     )
     turn_growth: float = parameter(
-        22.0,
+        28.0,
         "Relative turn by slip on the way down: per way, lean and squared share by which drives go too far",
         unit="1/(m rad)",
         low=0.0,
         high=1000.0,
     )
     neighbour_turn_sigma_rad: float = parameter(
-        0.002, "How far the neighbour turns by slip in its step", unit="rad", low=0.0, high=1.0
+        0.003, "How far the neighbour turns by slip in its step", unit="rad", low=0.0, high=1.0
     )
 
 
