@@ -1,6 +1,7 @@
 """The estimate of the neighbour's pose against the pose that made the pictures."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,12 +84,20 @@ def test_the_covariance_stays_symmetric_and_positive():
             assert np.linalg.eigvalsh(hypothesis.covariance).min() > 0.0
 
 
-def test_an_estimate_that_a_look_contradicts_is_made_anew():
-    found = new_filter()
-    look(found, state_of())
-    found.assume_heading(math.radians(0.5))
-    found.look(hulls(blocks_of(state_of(0.1, 0.5, -0.4))), doubt=True)
-    assert found.best.state[Y] == pytest.approx(0.5, abs=0.05)
+def covered(boxes, share):
+    """Hide the left part of a look's boxes."""
+    left, right = min(box.left for box in boxes.values()), max(box.right for box in boxes.values())
+    edge = left + share * (right - left)
+    return {face: replace(box, left=max(box.left, edge)) for face, box in boxes.items() if box.right > edge + 6.0}
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(-0.1, 0.1), st.floats(0.29, 0.5), st.floats(-0.8, 0.8))
+def test_a_whole_marker_is_told_from_a_half_covered_target(x_m, y_m, yaw_rad):
+    boxes = hulls(blocks_of(state_of(x_m, y_m, yaw_rad)))
+    assert new_filter().whole(boxes)
+    if TARGET in (rest := covered(boxes, 0.5)) and rest[TARGET].left > boxes[TARGET].left:
+        assert not new_filter().whole(rest)
 
 
 def test_a_block_far_from_where_its_face_should_be_is_left_out():

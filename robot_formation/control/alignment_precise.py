@@ -17,7 +17,7 @@ from robot_formation.control.pose_filter import FilterParameters, PoseFilter
 from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y
 from robot_formation.parameters import parameter
 
-_SURPRISE = 12.0
+_SURPRISE = 6.0
 """Mean square of a look's innovations by their scatter from which on something is in the way."""
 _VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
@@ -107,7 +107,7 @@ class PreciseAlignment:
         boxes = self._boxes(frames)
         if not self._filter.known:
             return 0.0
-        if TARGET in boxes and self._filter.surprise(boxes) < _SURPRISE:
+        if TARGET in boxes and not self._strange(boxes):
             self._filter.look(boxes)
         heading = way_to(self._filter.best.state, FORMATION).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
@@ -125,8 +125,8 @@ class PreciseAlignment:
     def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
         boxes = self._boxes(frames)
-        strange = self._filter.known and self._filter.surprise(boxes) >= _SURPRISE
-        if strange and self._search.looks >= self._p.search.hold_looks:
+        strange = bool(boxes) and self._strange(boxes)
+        if strange and self._search.looks >= self._p.search.hold_looks and self._filter.whole(boxes):
             # What doesn't fit for so long is not in the way: the neighbour, or the follower, was moved.
             self._filter.forget()
             strange = False
@@ -136,7 +136,7 @@ class PreciseAlignment:
             return decision
         self._search.found()
         first = not self._filter.known
-        self._filter.look(boxes, doubt=self._timestep == 0)
+        self._filter.look(boxes)
         if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             self._vantages = []
@@ -176,6 +176,10 @@ class PreciseAlignment:
     def _boxes(self, frames: Frames) -> dict[int, Box]:
         last = frames[-self._p.averaged_frames :]
         return mean_boxes([self._filter.plausible(blocks) for blocks in last])
+
+    def _strange(self, boxes: dict[int, Box]) -> bool:
+        """Whether a look shows no whole marker, or one where none is expected."""
+        return not self._filter.whole(boxes) or (self._filter.known and self._filter.surprise(boxes) >= _SURPRISE)
 
     def _placed(self, state: Vector) -> bool:
         return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m

@@ -45,7 +45,8 @@ _ITERATIONS = 6
 _STRAY_SIGMAS = 1.5
 _KEPT_COST = 16.0
 _LIKELY_COST = 16.0
-_MISFIT_COST = 30.0
+_MISFIT = 9.0
+"""Squared residuals of a look's edges from which on the marker isn't seen whole."""
 _GATE_PX = 15.0
 _HYPOTHESES = 14
 FACES = (TARGET, FRONT, REAR)
@@ -221,16 +222,14 @@ class PoseFilter:
 
     # --- looks ------------------------------------------------------------------------------------------------------
 
-    def look(self, boxes: dict[int, Box], *, doubt: bool = False) -> None:
-        """Take a look's boxes, at least one; with `doubt`, an estimate that they contradict is made anew from them."""
-        seen = view(boxes, self._edges)
-        before = self._least() if self.hypotheses else 0.0
+    def look(self, boxes: dict[int, Box]) -> None:
+        """Take a look's boxes, at least one."""
         if not self.hypotheses:
-            self._begin(boxes)
-        self._take(seen)
-        if not self.hypotheses or (doubt and self._least() - before > _MISFIT_COST):
-            self._begin(boxes)
-            self._take(seen)
+            self.hypotheses = self._guesses(boxes)
+        self._take(view(boxes, self._edges))
+        if not self.hypotheses:
+            self.hypotheses = self._guesses(boxes)
+            self._take(view(boxes, self._edges))
 
     def _take(self, seen: View) -> None:
         for hypothesis in self.hypotheses:
@@ -269,15 +268,34 @@ class PoseFilter:
             costs.append(float(innovation @ np.linalg.solve(scatter, innovation)) / len(seen.edges))
         return min(costs)
 
-    def _begin(self, boxes: dict[int, Box]) -> None:
+    def whole(self, boxes: dict[int, Box]) -> bool:
+        """Whether a look's boxes, at least one, fit together for some pose: not those of a partly covered marker."""
+        seen = view(boxes, self._edges)
+        return any(self._fits(guess, seen) for guess in sorted(self._guesses(boxes), key=lambda g: abs(g.state[YAW])))
+
+    def _fits(self, guess: Hypothesis, seen: View) -> bool:
+        self._update(guess, seen)
+        return _sane(guess) and self._residuals(guess.state, seen) < _MISFIT
+
+    def _residuals(self, state: Vector, seen: View) -> float:
+        edges = [*self._trusted(state, seen), *self._exceeded(state, seen)]
+        if not edges:
+            return 0.0
+        predicted = self._linearise(state, edges)[1]
+        ratios = (np.array([edge.position_px for edge in edges]) - predicted) / [edge.sigma_px for edge in edges]
+        strays = np.maximum(1.0, np.abs(ratios) / _STRAY_SIGMAS)
+        return float(np.sum(ratios**2 / strays)) + self._contradiction(state, seen)
+
+    def _guesses(self, boxes: dict[int, Box]) -> list[Hypothesis]:
         face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
         box = boxes[face]
-        self.hypotheses = []
+        guesses = []
         for degrees in range(-90, 91, 10):
             guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
             ground = [self._p.curvature_sigma_per_m**2, self._p.twist_sigma_rad**2]
             covariance = np.diag([0.1**2, 0.1**2, math.radians(12.0) ** 2, *ground])
-            self.hypotheses.append(Hypothesis(guess, covariance))
+            guesses.append(Hypothesis(guess, covariance))
+        return guesses
 
     def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:
         steps = np.diag([1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
