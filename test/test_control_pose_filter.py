@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robot_formation.control.alignment import FRONT, TARGET, hulls
-from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, way_to
+from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, legs, way_to
 from robot_formation.control.drive_experience import DriveExperience
 from robot_formation.control.marker_view import mean_boxes, one_marker
 from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
@@ -84,20 +84,16 @@ def test_the_covariance_stays_symmetric_and_positive():
             assert np.linalg.eigvalsh(hypothesis.covariance).min() > 0.0
 
 
-def covered(boxes, share):
-    """Hide the left part of a look's boxes."""
-    left, right = min(box.left for box in boxes.values()), max(box.right for box in boxes.values())
-    edge = left + share * (right - left)
-    return {face: replace(box, left=max(box.left, edge)) for face, box in boxes.items() if box.right > edge + 6.0}
-
-
 @settings(max_examples=20, deadline=None)
-@given(st.floats(-0.1, 0.1), st.floats(0.29, 0.5), st.floats(-0.8, 0.8))
-def test_a_whole_marker_is_told_from_a_half_covered_target(x_m, y_m, yaw_rad):
+@given(st.floats(-0.1, 0.1), st.floats(0.29, 0.5), st.floats(-0.8, 0.8), st.floats(0.4, 0.6), st.booleans())
+def test_a_whole_marker_is_told_from_a_half_covered_face(x_m, y_m, yaw_rad, share, left):
     boxes = hulls(blocks_of(state_of(x_m, y_m, yaw_rad)))
     assert new_filter().whole(boxes)
-    if TARGET in (rest := covered(boxes, 0.5)) and rest[TARGET].left > boxes[TARGET].left:
-        assert not new_filter().whole(rest)
+    if set(boxes) == {TARGET}:
+        box = boxes[TARGET]
+        edge = box.left + share * box.width
+        rest = replace(box, left=edge) if left else replace(box, right=edge)
+        assert not new_filter().whole({TARGET: rest})
 
 
 def test_a_block_far_from_where_its_face_should_be_is_left_out():
@@ -142,3 +138,13 @@ def test_a_drive_learns_its_slip_apart_from_legs_aside():
         experience.moved(Motion(0.05, aside_m), Motion(0.05, measured))
     assert experience.slip == pytest.approx(0.03, abs=0.003)
     assert experience.overshoot == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_is_learned_of_short_legs_adds_no_leg_that_was_not_asked_for():
+    experience, turned = DriveExperience(), math.radians(4.3)
+    for aside_m in (0.01, -0.01) * 3:
+        experience.compensated(Motion(0.0, aside_m))
+        experience.moved(Motion(0.0, aside_m), Motion(0.0, 0.5 * aside_m))
+    for ahead_m in np.linspace(-0.19, 0.19, 21):
+        asked = Motion(ahead_m * math.cos(turned), ahead_m * math.sin(turned), turned)
+        assert legs(experience.compensated(asked)) == legs(asked)

@@ -14,7 +14,7 @@ from robot_formation.control.leader_search import LeaderSearch, SearchParameters
 from robot_formation.control.marker_view import EdgeParameters, mean_boxes
 from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 from robot_formation.control.pose_filter import FilterParameters, PoseFilter
-from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y
+from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y, after_motion
 from robot_formation.parameters import parameter
 
 _SURPRISE = 6.0
@@ -24,7 +24,10 @@ _VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 _VANTAGE_BESIDE_M = 0.312
 _VANTAGE_NEAR = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
-_LAST_MOVES = 5
+_SPARE_MOVES = 2
+"""Moves left over for last corrections."""
+_ENOUGH_MOVES = 6
+"""As long as so many are left, the way back isn't counted."""
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
 _FIRST_SIDESTEP_SIGMA_M = 0.002
@@ -145,10 +148,13 @@ class PreciseAlignment:
     def _correct(self) -> Decision:
         p, state = self._p, self._filter.best.state
         unsure = self._filter.yaw_sigma_rad > p.certain_rad
-        searching = unsure and self._timestep == 0 and self._moves < p.max_moves - _LAST_MOVES and self._vantages != []
-        if not searching and self._within(way_to(state, FORMATION)):
-            return Decision(Verdict.ALIGNED, reason="inside the tolerances")
-        motion, reason = self._next(state, searching)
+        motion, reason = Motion(), ""
+        if unsure and self._timestep == 0 and self._vantages != []:
+            motion, reason = self._to_see_more(state)
+        if motion == Motion():
+            if self._within(way_to(state, FORMATION)):
+                return Decision(Verdict.ALIGNED, reason="inside the tolerances")
+            motion, reason = self._to_formation(state)
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
         if self._moves + legs(motion) > p.max_moves:
@@ -156,22 +162,43 @@ class PreciseAlignment:
         self._moves += legs(motion)
         return Decision(Verdict.MOVE, self._experience.compensated(motion), reason)
 
-    def _next(self, state: Vector, searching: bool) -> tuple[Motion, str]:
-        """Choose the next motion and say why."""
-        p = self._p
+    def _to_see_more(self, state: Vector) -> tuple[Motion, str]:
+        """Choose the next motion to a place from where the heading shows; none if too few moves would be left."""
+        motion, reason = self._first(state)
+        if motion != Motion():
+            return motion, reason
+        states = self._filter.likely()
+        for vantage in self._places(state):
+            motion = self._without_trifles(self._approach.next(states, vantage), _VANTAGE_NEAR)
+            if motion == Motion():
+                continue
+            left = self._without_trifles(way_to(after_motion(state, motion), FORMATION), self._trifle())
+            needed = legs(motion) + self._approach.moves(left) + _SPARE_MOVES
+            affordable = self._p.max_moves - self._moves >= min(needed, _ENOUGH_MOVES)
+            return (motion, "to see two faces") if affordable else (Motion(), "")
+        return Motion(), ""
+
+    def _to_formation(self, state: Vector) -> tuple[Motion, str]:
+        """Choose the next motion to the formation position and say why."""
+        motion, reason = self._first(state)
+        if motion != Motion():
+            return motion, reason
+        motion = self._approach.next(self._filter.likely(), FORMATION)
+        return self._without_trifles(motion, self._trifle()), "to the formation position"
+
+    def _first(self, state: Vector) -> tuple[Motion, str]:
+        """Choose what comes before any goal: to keep clear, and to face a marker whose heading is hardly known."""
         states = self._filter.likely()
         if not self._approach.apart(state) and (away := self._approach.away(states)) != Motion():
             return away, "too close: away along u"
         if self._filter.yaw_sigma_rad > _CLUELESS_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
             return self._approach.face(states), "turn towards the marker"
-        if searching:
-            for vantage in self._places(state):
-                motion = self._without_trifles(self._approach.next(states, vantage), _VANTAGE_NEAR)
-                if motion != Motion():
-                    return motion, "to see two faces"
+        return Motion(), ""
+
+    def _trifle(self) -> Motion:
+        p = self._p
         share = 0.5 if self._timestep > 0 else 0.5 * p.first_share
-        trifle = Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
-        return self._without_trifles(self._approach.next(states, FORMATION), trifle), "to the formation position"
+        return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
 
     def _boxes(self, frames: Frames) -> dict[int, Box]:
         last = frames[-self._p.averaged_frames :]

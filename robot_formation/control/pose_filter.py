@@ -47,6 +47,8 @@ _KEPT_COST = 16.0
 _LIKELY_COST = 16.0
 _MISFIT = 9.0
 """Squared residuals of a look's edges from which on the marker isn't seen whole."""
+_BORDER_PX = 8.0
+"""Of a face that the picture cuts off, so much more must show before it is always reported."""
 _GATE_PX = 15.0
 _HYPOTHESES = 14
 FACES = (TARGET, FRONT, REAR)
@@ -344,10 +346,10 @@ class PoseFilter:
 
     def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
         """List the bounds on faces that were not reported which a state breaks."""
-        widths, columns = self._model.widths(state), self._model.pixels(state[None])[0, :, 0]
-        if columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX:
-            return []  # it may be beyond the picture's edge
-        return [edge for edge in hidden(seen, self._edges) if widths[edge.face] > edge.position_px]
+        columns = self._model.pixels(state[None])[0, :, 0]
+        cut = columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX
+        shown, spare = self._model.shown(state, (0.0, PICTURE_WIDTH_PX)), _BORDER_PX if cut else 0.0
+        return [edge for edge in hidden(seen, self._edges) if shown[edge.face] > edge.position_px + spare]
 
     def _contradiction(self, state: Vector, seen: View) -> float:
         """Charge faces that were reported and should not have been, or the other way round."""

@@ -116,7 +116,11 @@ class MarkerModel:
 
     def widths(self, state: Vector) -> dict[int, float]:
         """Tell how wide each face appears, px; negative if it is turned away."""
-        columns = self.pixels(state[None])[0, :, 0]
+        return self.shown(state, (-math.inf, math.inf))
+
+    def shown(self, state: Vector, limits_px: tuple[float, float]) -> dict[int, float]:
+        """Tell how much of each face's width lies between two columns, px; negative if it is turned away."""
+        columns = np.clip(self.pixels(state[None])[0, :, 0], *limits_px)
         middle = {edge: float(columns[corners].mean()) for edge, corners in _CORNERS.items()}
         return {face: middle[face, "right"] - middle[face, "left"] for face in (TARGET, FRONT, REAR)}
 
