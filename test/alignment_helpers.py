@@ -31,8 +31,8 @@ def _block(face, corners, seen, index):
     e = EDGES
     biases = {
         TARGET: (e.target_left_px + (0.5 if FRONT in seen else 0.0), e.target_right_px),
-        FRONT: (e.front_left_px, e.front_right_px),
-        REAR: (e.rear_left_px, e.rear_right_px),
+        FRONT: (e.front_left_px, e.front_right_px[-1]),
+        REAR: (e.rear_left_px[-1], 0.0),
     }[face]
     left, right = corners[:, 0].min() + biases[0], corners[:, 0].max() + biases[1]
     top, bottom = corners[:, 1].min() + e.target_top_px, corners[:, 1].max() + e.target_bottom_px

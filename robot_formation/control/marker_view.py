@@ -54,17 +54,14 @@ class EdgeParameters:
         high=316.0,
     )
     rear_left_px: tuple[float, ...] = parameter(
-        (3.5, 2.4, 3.4, 2.5),
+        (3.5, 2.5, 3.4, 2.6),
         "Bias of its left edge below the first of these widths, between them and above the last",
         unit="px",
         low=-20.0,
         high=20.0,
     )
     rear_left_sigma_px: tuple[float, ...] = parameter(
-        (0.9, 1.0, 0.9, 0.9), "Scatter of its left edge, likewise", unit="px", low=0.01, high=20.0
-    )
-    rear_right_px: float = parameter(
-        0.1, "Bias of its right edge where no Target block follows", unit="px", low=-20.0, high=20.0
+        (0.9, 1.1, 0.9, 1.0), "Scatter of its left edge, likewise", unit="px", low=0.01, high=20.0
     )
     column_sigma_px: float = parameter(0.9, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
     sliver_px: float = parameter(
@@ -176,11 +173,9 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
         band = p.front_band(front.width)
         edges.append(Edge(FRONT, "right", front.right - p.front_right_px[band], p.front_right_sigma_px[band]))
     if rear is not None:
+        # Its right edge isn't sharp: it may take in a sliver of the Target face.
         band = p.rear_band(rear.width)
-        sigma = p.rear_left_sigma_px[band]
-        edges.append(Edge(REAR, "left", rear.left - p.rear_left_px[band], sigma))
-        if target is None:
-            edges.append(Edge(REAR, "right", rear.right - p.rear_right_px, sigma))
+        edges.append(Edge(REAR, "left", rear.left - p.rear_left_px[band], p.rear_left_sigma_px[band]))
     if boxes:
         widest = max(boxes, key=lambda face: boxes[face].width)
         edges += _rows(widest, boxes[widest], p, 1.0 if widest == TARGET else 1.5)

@@ -50,7 +50,7 @@ _MISFIT = 9.0
 _BORDER_PX = 8.0
 """Of a face that the picture cuts off, so much more must show before it is always reported."""
 _GATE_PX = 15.0
-_HYPOTHESES = 14
+_HYPOTHESES = 50
 FACES = (TARGET, FRONT, REAR)
 
 
@@ -292,10 +292,10 @@ class PoseFilter:
         face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
         box = boxes[face]
         guesses = []
-        for degrees in range(-90, 91, 10):
+        for degrees in range(-92, 93, 4):
             guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
             ground = [self._p.curvature_sigma_per_m**2, self._p.twist_sigma_rad**2]
-            covariance = np.diag([0.1**2, 0.1**2, math.radians(12.0) ** 2, *ground])
+            covariance = np.diag([0.1**2, 0.1**2, math.radians(3.0) ** 2, *ground])
             guesses.append(Hypothesis(guess, covariance))
         return guesses
 
@@ -366,7 +366,7 @@ class PoseFilter:
         for hypothesis in sorted(self.hypotheses, key=lambda h: h.cost):
             if hypothesis.cost > self._least() + _KEPT_COST:
                 continue
-            if all(abs(hypothesis.state[YAW] - other.state[YAW]) > math.radians(3.0) for other in kept):
+            if all(abs(hypothesis.state[YAW] - other.state[YAW]) > math.radians(1.5) for other in kept):
                 kept.append(hypothesis)
         self.hypotheses = kept[:_HYPOTHESES]
 
