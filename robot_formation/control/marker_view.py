@@ -63,6 +63,23 @@ class EdgeParameters:
     rear_left_sigma_px: tuple[float, ...] = parameter(
         (0.9, 1.1, 0.9, 1.0), "Scatter of its left edge, likewise", unit="px", low=0.01, high=20.0
     )
+    clear_height_px: float = parameter(
+        44.0,
+        "Height of the Target block from which on these values hold; smaller is too far away",
+        unit="px",
+        low=0.0,
+        high=208.0,
+    )
+    clear_ratio: float = parameter(
+        0.85, "Width by height of the Target block from which on they hold; narrower is too oblique", low=0.0, high=10.0
+    )
+    rough_front_right_px: float = parameter(
+        -0.8, "Bias of the Front block's right edge in other views", unit="px", low=-20.0, high=20.0
+    )
+    rough_rear_left_px: float = parameter(
+        3.7, "Bias of the Rear block's left edge in other views", unit="px", low=-20.0, high=20.0
+    )
+    rough_sigma_px: float = parameter(1.6, "Scatter of both in other views", unit="px", low=0.01, high=20.0)
     column_sigma_px: float = parameter(0.9, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
     sliver_px: float = parameter(
         5.6,
@@ -93,6 +110,12 @@ class EdgeParameters:
                     "have one value more than it"
                 )
 
+    def clear(self, target: Box | None) -> bool:
+        """Whether the marker is near and frontal enough for the finer values of its outer edges."""
+        if target is None or target.height < self.clear_height_px:
+            return False
+        return target.width >= self.clear_ratio * target.height
+
     def front_band(self, width_px: float) -> int:
         """Tell which values hold for a Front block of this reported width."""
         return bisect_right(self.front_widths_px, width_px)
@@ -100,6 +123,20 @@ class EdgeParameters:
     def rear_band(self, width_px: float) -> int:
         """Tell which values hold for a Rear block of this reported width."""
         return bisect_right(self.rear_widths_px, width_px)
+
+    def front_right(self, front: Box, target: Box | None) -> tuple[float, float]:
+        """Tell bias and scatter of the Front block's right edge, px."""
+        if not self.clear(target):
+            return self.rough_front_right_px, self.rough_sigma_px
+        band = self.front_band(front.width)
+        return self.front_right_px[band], self.front_right_sigma_px[band]
+
+    def rear_left(self, rear: Box, target: Box | None) -> tuple[float, float]:
+        """Tell bias and scatter of the Rear block's left edge, px."""
+        if not self.clear(target):
+            return self.rough_rear_left_px, self.rough_sigma_px
+        band = self.rear_band(rear.width)
+        return self.rear_left_px[band], self.rear_left_sigma_px[band]
 
 
 @dataclass(frozen=True)
@@ -170,12 +207,12 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
             edges.append(Edge(TARGET, "right", target.right - p.target_right_px, near))
     if front is not None:
         edges.append(Edge(FRONT, "left", front.left - p.front_left_px, near))
-        band = p.front_band(front.width)
-        edges.append(Edge(FRONT, "right", front.right - p.front_right_px[band], p.front_right_sigma_px[band]))
+        bias, sigma = p.front_right(front, target)
+        edges.append(Edge(FRONT, "right", front.right - bias, sigma))
     if rear is not None:
         # Its right edge isn't sharp: it may take in a sliver of the Target face.
-        band = p.rear_band(rear.width)
-        edges.append(Edge(REAR, "left", rear.left - p.rear_left_px[band], p.rear_left_sigma_px[band]))
+        bias, sigma = p.rear_left(rear, target)
+        edges.append(Edge(REAR, "left", rear.left - bias, sigma))
     if boxes:
         widest = max(boxes, key=lambda face: boxes[face].width)
         edges += _rows(widest, boxes[widest], p, 1.0 if widest == TARGET else 1.5)

@@ -44,7 +44,7 @@ from robot_formation.vision.block import Block
 _ITERATIONS = 6
 _STRAY_SIGMAS = 1.5
 _KEPT_COST = 16.0
-_LIKELY_COST = 16.0
+_LIKELY_COST = 9.0
 _MISFIT = 9.0
 """Squared residuals of a look's edges from which on the marker isn't seen whole."""
 _BORDER_PX = 8.0
