@@ -188,7 +188,7 @@ def test_edges_of_neighbouring_faces_count_beside_the_target_block_only():
     wide = reported((TARGET, 152, 200), (FRONT, 202, 229))
     narrow = reported((TARGET, 152, 200), (FRONT, 202, 208))
     rear = reported((TARGET, 152, 200), (REAR, 123, 150))
-    small = Sighting(0.6, 0.0, 0.0, True, 22, (Block(TARGET, 176, 65, 48, 30), Block(REAR, 136, 65, 27, 30)))
+    small = Sighting(0.6, 0.0, 0.0, True, 22, (Block(TARGET, 176, 65, 48, 30), Block(REAR, 136.5, 65, 27, 30)))
     looks = [(look, faces) for look in (wide, narrow, rear, small) for _ in range(3)]
     found = edge_biases([*looks, (reported(), faces)])
     means = {name: bias.mean_px for name, bias in found.items()}

@@ -45,8 +45,8 @@ _ITERATIONS = 6
 _STRAY_SIGMAS = 1.5
 _KEPT_COST = 16.0
 _LIKELY_COST = 9.0
-_MISFIT = 9.0
-"""Squared residuals of a look's edges from which on the marker isn't seen whole."""
+_MISFIT, _MISFIT_SIGMAS = 9.0, 2.5
+"""Squared residuals of a look's edges from which on the marker isn't seen whole; where they begin to grow less."""
 _BORDER_PX = 8.0
 """Of a face that the picture cuts off, so much more must show before it is always reported."""
 _GATE_PX = 15.0
@@ -285,7 +285,7 @@ class PoseFilter:
             return 0.0
         predicted = self._linearise(state, edges)[1]
         ratios = (np.array([edge.position_px for edge in edges]) - predicted) / [edge.sigma_px for edge in edges]
-        strays = np.maximum(1.0, np.abs(ratios) / _STRAY_SIGMAS)
+        strays = np.maximum(1.0, np.abs(ratios) / _MISFIT_SIGMAS)
         return float(np.sum(ratios**2 / strays)) + self._contradiction(state, seen)
 
     def _guesses(self, boxes: dict[int, Box]) -> list[Hypothesis]:
