@@ -131,7 +131,7 @@ class OnlineDMD(RecursiveFit):
         return self.learn(*self.pair(x, y))
 
     def learn(self, x: Vector, y: Vector) -> Vector:
-        """Do what `update` does, with vectors that are known to be finite and of the right shape: nothing is checked."""
+        """Do what `update` does with vectors that are known to be finite and of the right shape: nothing is checked."""
         innovation: Vector = y - self.k.dot(x)
         if self._p is None or not self._recursion(self._p, x, innovation):
             self._factor(x, y)
