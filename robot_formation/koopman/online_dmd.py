@@ -128,10 +128,13 @@ class OnlineDMD(RecursiveFit):
         Raises:
             KoopmanError: on a wrong shape, or a value that is not finite or beyond 1e100; nothing is learned then.
         """
-        before, after = self.pair(x, y)
-        innovation: Vector = after - self.k.dot(before)
-        if self._p is None or not self._recursion(self._p, before, innovation):
-            self._factor(before, after)
+        return self.learn(*self.pair(x, y))
+
+    def learn(self, x: Vector, y: Vector) -> Vector:
+        """Do what `update` does with vectors that are known to be finite and of the right shape: nothing is checked."""
+        innovation: Vector = y - self.k.dot(x)
+        if self._p is None or not self._recursion(self._p, x, innovation):
+            self._factor(x, y)
         return innovation
 
     def _recursion(self, p: Matrix, x: Vector, innovation: Vector) -> bool:

@@ -81,7 +81,7 @@ class Measured:
     def observe(self, x: Vector) -> None:
         """See `Model`."""
         if self._last is not None:
-            self._innovation = self._dmd.update(self._last, x)
+            self._innovation = self._dmd.learn(self._last, x)  # checked by the predictor
             self._pairs += 1
         self._last = x
 
