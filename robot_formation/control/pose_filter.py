@@ -15,17 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
-from robot_formation.control.marker_view import (
-    PICTURE_WIDTH_PX,
-    Edge,
-    EdgeParameters,
-    View,
-    hidden,
-    one_marker,
-    sliver,
-    view,
-)
+from robot_formation.control.marker_view import EdgeParameters, View, one_marker, view
 from robot_formation.control.motion import Motion
+from robot_formation.control.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.control.relative_pose import (
     CURVATURE,
     SIZE,
@@ -41,14 +33,8 @@ from robot_formation.control.relative_pose import (
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
-_ITERATIONS = 6
-_STRAY_SIGMAS = 1.5
 _KEPT_COST = 16.0
 _LIKELY_COST = 9.0
-_MISFIT, _MISFIT_SIGMAS = 9.0, 2.5
-"""Squared residuals of a look's edges from which on the marker isn't seen whole; where they begin to grow less."""
-_BORDER_PX = 8.0
-"""Of a face that the picture cuts off, so much more must show before it is always reported."""
 _GATE_PX = 15.0
 _HYPOTHESES = 50
 FACES = (TARGET, FRONT, REAR)
@@ -109,21 +95,13 @@ class FilterParameters:
     )
 
 
-@dataclass
-class Hypothesis:
-    """State (5,) and covariance (5, 5) as in `relative_pose`, and twice the negative log likelihood of all looks."""
-
-    state: Vector
-    covariance: Matrix
-    cost: float = 0.0
-
-
 class PoseFilter:
     """Where the neighbour stands, as far as looks and moves tell."""
 
     def __init__(self, model: MarkerModel, edges: EdgeParameters, parameters: FilterParameters) -> None:
         self._model = model
         self._edges = edges
+        self._looks = LookUpdate(model, edges)
         self._p = parameters
         self.hypotheses: list[Hypothesis] = []
 
@@ -235,7 +213,7 @@ class PoseFilter:
 
     def _take(self, seen: View) -> None:
         for hypothesis in self.hypotheses:
-            self._update(hypothesis, seen)
+            self._looks.update(hypothesis, seen)
         self._prune()
 
     def plausible(self, blocks: Sequence[Block]) -> list[Block]:
@@ -259,34 +237,13 @@ class PoseFilter:
 
     def surprise(self, boxes: dict[int, Box]) -> float:
         """Tell how badly a look fits: squared innovation by its expected scatter, per edge."""
-        seen = view(boxes, self._edges)
-        if not seen.edges:
-            return 0.0
-        costs = []
-        for hypothesis in self.hypotheses:
-            h, predicted = self._linearise(hypothesis.state, seen.edges)
-            innovation = np.array([edge.position_px for edge in seen.edges]) - predicted
-            scatter = h @ hypothesis.covariance @ h.T + np.diag([4.0 * edge.sigma_px**2 for edge in seen.edges])
-            costs.append(float(innovation @ np.linalg.solve(scatter, innovation)) / len(seen.edges))
-        return min(costs)
+        return self._looks.surprise(self.hypotheses, view(boxes, self._edges))
 
     def whole(self, boxes: dict[int, Box]) -> bool:
         """Whether a look's boxes, at least one, fit together for some pose: not those of a partly covered marker."""
         seen = view(boxes, self._edges)
-        return any(self._fits(guess, seen) for guess in sorted(self._guesses(boxes), key=lambda g: abs(g.state[YAW])))
-
-    def _fits(self, guess: Hypothesis, seen: View) -> bool:
-        self._update(guess, seen)
-        return _sane(guess) and self._residuals(guess.state, seen) < _MISFIT
-
-    def _residuals(self, state: Vector, seen: View) -> float:
-        edges = [*self._trusted(state, seen), *self._exceeded(state, seen)]
-        if not edges:
-            return 0.0
-        predicted = self._linearise(state, edges)[1]
-        ratios = (np.array([edge.position_px for edge in edges]) - predicted) / [edge.sigma_px for edge in edges]
-        strays = np.maximum(1.0, np.abs(ratios) / _MISFIT_SIGMAS)
-        return float(np.sum(ratios**2 / strays)) + self._contradiction(state, seen)
+        guesses = sorted(self._guesses(boxes), key=lambda guess: abs(guess.state[YAW]))  # the likeliest first
+        return any(self._looks.fits(guess, seen) for guess in guesses)
 
     def _guesses(self, boxes: dict[int, Box]) -> list[Hypothesis]:
         face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
@@ -299,70 +256,10 @@ class PoseFilter:
             guesses.append(Hypothesis(guess, covariance))
         return guesses
 
-    def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:
-        steps = np.diag([1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
-        found = self._model.edges(np.concatenate([state[None], state + steps, state - steps]), edges)
-        return ((found[1 : SIZE + 1] - found[SIZE + 1 :]) / 2e-4).T, found[0]
-
-    def _update(self, hypothesis: Hypothesis, seen: View) -> None:
-        """Iterated extended Kalman update; the cost is that of the posterior's residuals and of the way to it."""
-        edges = [*self._trusted(hypothesis.state, seen), *self._exceeded(hypothesis.state, seen)]
-        if not edges:
-            return
-        measured = np.array([edge.position_px for edge in edges])
-        sigmas = np.array([edge.sigma_px for edge in edges])
-        noise = np.diag(sigmas**2)
-        prior, covariance = hypothesis.state, hypothesis.covariance
-        state = prior
-        for number in range(_ITERATIONS):
-            h, predicted = self._linearise(state, edges)
-            # Huber's weights: an edge that contradicts the others, as of a broken block, pulls with limited force.
-            strays = np.maximum(1.0, np.abs(measured - predicted) / (_STRAY_SIGMAS * sigmas)) if number else 1.0
-            noise = np.diag(sigmas**2 * strays)
-            scatter = h @ covariance @ h.T + noise
-            gain = np.linalg.solve(scatter, h @ covariance).T
-            change = prior + gain @ (measured - predicted - h @ (prior - state)) - state
-            change[YAW] = max(-0.3, min(0.3, change[YAW]))
-            state = state + change
-            if float(np.abs(change).max()) < 1e-5:
-                break
-        h, predicted = self._linearise(state, edges)
-        kept = np.eye(SIZE) - gain @ h
-        hypothesis.covariance = kept @ covariance @ kept.T + gain @ noise @ gain.T
-        hypothesis.state = state
-        residual, way = measured - predicted, state - prior
-        hypothesis.cost += float(residual @ (residual / np.diag(noise)) + way @ np.linalg.solve(covariance, way))
-        hypothesis.cost += float(np.linalg.slogdet(scatter)[1])
-        hypothesis.cost += self._contradiction(state, seen)
-
-    def _trusted(self, state: Vector, seen: View) -> list[Edge]:
-        """List the edges; a Front face that is not reported may shift the Target block's right one."""
-        if FRONT in seen.faces or (front_px := self._model.widths(state)[FRONT]) <= 0.0:
-            return list(seen.edges)
-        return [
-            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (TARGET, "right") else edge
-            for edge in seen.edges
-        ]
-
-    def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
-        """List the bounds on faces that were not reported which a state breaks."""
-        columns = self._model.pixels(state[None])[0, :, 0]
-        cut = columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX
-        shown, spare = self._model.shown(state, (0.0, PICTURE_WIDTH_PX)), _BORDER_PX if cut else 0.0
-        return [edge for edge in hidden(seen, self._edges) if shown[edge.face] > edge.position_px + spare]
-
-    def _contradiction(self, state: Vector, seen: View) -> float:
-        """Charge faces that were reported and should not have been, or the other way round."""
-        widths = self._model.widths(state)
-        cost = sum(max(0.0, 1.0 - widths[face]) ** 2 / 4.0 for face in seen.faces)
-        for edge in self._exceeded(state, seen):
-            cost += ((widths[edge.face] - edge.position_px) / edge.sigma_px) ** 2
-        return cost
-
     def _prune(self) -> None:
         """Keep the likely hypotheses, one of each kind, the best first."""
         kept: list[Hypothesis] = []
-        self.hypotheses = [h for h in self.hypotheses if math.isfinite(h.cost) and _sane(h)]
+        self.hypotheses = [h for h in self.hypotheses if h.sane]
         for hypothesis in sorted(self.hypotheses, key=lambda h: h.cost):
             if hypothesis.cost > self._least() + _KEPT_COST:
                 continue
@@ -372,12 +269,6 @@ class PoseFilter:
 
     def _least(self) -> float:
         return min(h.cost for h in self.hypotheses)
-
-
-def _sane(hypothesis: Hypothesis) -> bool:
-    """Whether a hypothesis is about a neighbour that could be in view."""
-    state = hypothesis.state
-    return bool(np.isfinite(state).all()) and math.hypot(state[X], state[Y]) < 2.0 and abs(state[YAW]) < 2.0
 
 
 def _gain_update(hypothesis: Hypothesis, h: Matrix, innovation: Vector, variance: Vector) -> float:
