@@ -30,7 +30,7 @@ def planar(motion, stamp_ns):
 
 @pytest.fixture
 def wire():
-    return wired("fine_tuner", "follower_1", look=LOOK)
+    return wired("fine_tuner", "follower_1", mode="paper", look=LOOK)
 
 
 def plain(sent):

@@ -28,6 +28,8 @@ _SPARE_MOVES = 2
 """Moves left over for last corrections."""
 _ENOUGH_MOVES = 6
 """As long as so many are left, the way back isn't counted."""
+_TRIFLE, _FIRST_TRIFLE = 0.8, 0.5
+"""Share of the tolerance up to which an offset is left alone while the other axis is corrected; in timestep 0."""
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
 _FIRST_SIDESTEP_SIGMA_M = 0.002
@@ -37,8 +39,8 @@ _FIRST_SIDESTEP_SIGMA_M = 0.002
 class PreciseParameters:
     """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
 
-    u_tolerance_m: float = parameter(0.007, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
-    v_tolerance_m: float = parameter(0.005, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    u_tolerance_m: float = parameter(0.009, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
+    v_tolerance_m: float = parameter(0.0065, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
     heading_tolerance_rad: float = parameter(
         math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
     )
@@ -46,7 +48,7 @@ class PreciseParameters:
         math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
     )
     first_share: float = parameter(
-        0.7, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
+        0.54, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
     )
     certain_rad: float = parameter(
         math.radians(0.8),
@@ -197,7 +199,7 @@ class PreciseAlignment:
 
     def _trifle(self) -> Motion:
         p = self._p
-        share = 0.5 if self._timestep > 0 else 0.5 * p.first_share
+        share = _TRIFLE if self._timestep > 0 else _FIRST_TRIFLE * p.first_share
         return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
 
     def _boxes(self, frames: Frames) -> dict[int, Box]:

@@ -45,7 +45,7 @@ class LookParameters:
 class FineTunerParameters:
     """Parameters of the follower's fine-tuning controller."""
 
-    mode: str = parameter("paper", "How the camera's blocks are used", choices=("paper", "precise"))
+    mode: str = parameter("precise", "How the camera's blocks are used", choices=("paper", "precise"))
     first_step_m: float = parameter(
         0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
     )
