@@ -176,7 +176,7 @@ def states(analysis_or_record):
 
 
 def test_a_neighbour_that_vanishes_in_a_run_is_lost_and_the_bag_is_complete(tmp_path, monkeypatch):
-    result, analysis = run(tmp_path, monkeypatch, lambda number, blocks: blocks if number < 12 * LOOK else [])
+    result, analysis = run(tmp_path, monkeypatch, lambda number, blocks: blocks if number < 5 * LOOK else [])
     assert result.exit_code == exit_codes.LOST
     assert analysis.outcome == "lost"
     assert 1 <= analysis.followers[0].totals["timesteps_finished"] < 4

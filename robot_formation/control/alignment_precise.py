@@ -81,8 +81,6 @@ class PreciseParameters:
 class PreciseAlignment:
     """Keeps the estimate over the timesteps; one decision a look."""
 
-    looks_before = True
-
     def __init__(self, parameters: PreciseParameters, first_step_m: float) -> None:
         self._p = parameters
         self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
@@ -107,13 +105,10 @@ class PreciseAlignment:
                 None if self._experience.drives else _FIRST_SIDESTEP_SIGMA_M,
             )
 
-    def turn_before(self, frames: Frames) -> float:
-        """Look before the prediction move; returns the turn [rad] that goes with it."""
-        boxes = self._boxes(frames)
+    def turn(self) -> float:
+        """Tell the turn [rad] to make with the prediction move."""
         if not self._filter.known:
             return 0.0
-        if TARGET in boxes and not self._strange(boxes):
-            self._filter.look(boxes)
         heading = way_to(self._filter.best.state, FORMATION).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
 
