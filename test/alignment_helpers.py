@@ -17,7 +17,7 @@ _CORNERS = {TARGET: [0, 1, 2, 3], FRONT: [2, 3, 4, 5], REAR: [6, 7, 0, 1]}
 
 def state_of(x_m=0.0, y_m=FORMATION_DISTANCE_M, yaw_rad=0.0, curvature_per_m=BOWL_CURVATURE_PER_M):
     """The neighbour in the follower's frame."""
-    return np.array([x_m, y_m, yaw_rad, curvature_per_m, 0.0])
+    return np.array([x_m, y_m, yaw_rad, curvature_per_m, 0.0, 0.0])
 
 
 def blocks_of(state):

@@ -20,8 +20,9 @@ from robot_formation.control.motion import Motion
 from robot_formation.control.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.control.relative_pose import (
     CURVATURE,
+    SADDLE,
     SIZE,
-    TWIST,
+    SKEW,
     YAW,
     MarkerModel,
     Matrix,
@@ -29,6 +30,7 @@ from robot_formation.control.relative_pose import (
     X,
     Y,
     after_motion,
+    leans,
 )
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
@@ -36,6 +38,8 @@ from robot_formation.vision.block import Block
 _KEPT_COST = 16.0
 _LIKELY_COST = 9.0
 _GATE_PX = 15.0
+_MOST_SURPRISE = 30.0
+_MISFIT_GAIN = 0.5
 _HYPOTHESES = 50
 FACES = (TARGET, FRONT, REAR)
 
@@ -45,14 +49,23 @@ class FilterParameters:
     """How far the filter trusts moves, the ground and what it saw before."""
 
     curvature_sigma_per_m: float = parameter(
-        0.15, "Curvature of the ground between the robots", unit="1/m", low=1e-4, high=10.0
+        0.15, "Mean curvature of the ground between the robots", unit="1/m", low=1e-4, high=10.0
     )
     curvature_drift_per_m: float = parameter(
-        0.005, "Change of that curvature with each step of the neighbour", unit="1/m", low=0.0, high=10.0
+        0.005,
+        "Change of the curvatures with each step of the neighbour; more where steps surprise",
+        unit="1/m",
+        low=0.0,
+        high=10.0,
     )
-    twist_sigma_rad: float = parameter(
-        0.006, "Relative pitch that the curvature doesn't account for", unit="rad", low=1e-4, high=0.5
+    saddle_sigma_per_m: float = parameter(
+        0.1,
+        "Half of the difference between the ground's curvatures along and across",
+        unit="1/m",
+        low=1e-4,
+        high=10.0,
     )
+    skew_sigma_per_m: float = parameter(0.02, "Mixed part of the ground's curvature", unit="1/m", low=1e-4, high=10.0)
     move_sigma: float = parameter(0.02, "Error of a measured move, share of its length", low=0.0, high=1.0)
     move_floor_m: float = parameter(0.0007, "Error of a measured move, least", unit="m", low=0.0, high=0.1)
     turn_sigma: float = parameter(0.06, "Error of a measured turn, share of it", low=0.0, high=1.0)
@@ -67,7 +80,17 @@ class FilterParameters:
         0.02, "How far the neighbour's step may differ from the last one", unit="m", low=0.0, high=1.0
     )
     neighbour_sidestep_sigma_m: float = parameter(
-        0.0005, "How far the neighbour's step leads aside from its heading", unit="m", low=0.0, high=1.0
+        0.0005,
+        "How far the neighbour's step leads aside from its heading, least; more where steps surprise",
+        unit="m",
+        low=0.0,
+        high=1.0,
+    )
+    calm_misfit: float = parameter(
+        0.03,
+        "Misfit of the first look after a step, mean square by its expected scatter, up to which nothing surprises",
+        low=1e-4,
+        high=100.0,
     )
     slip_per_lean: float = parameter(
         0.76,
@@ -104,6 +127,8 @@ class PoseFilter:
         self._looks = LookUpdate(model, edges)
         self._p = parameters
         self.hypotheses: list[Hypothesis] = []
+        self._misfit = 0.0
+        self._stepped = False
 
     @property
     def known(self) -> bool:
@@ -152,7 +177,7 @@ class PoseFilter:
         # The turn comes first: its error swings the way that follows.
         yaw = (p.turn_sigma * motion.yaw_rad) ** 2 + p.yaw_drift_rad**2 * length / 0.1
         place = p.move_floor_m**2 + (p.move_sigma * length) ** 2 + (0.02 * motion.yaw_rad) ** 2
-        noise = np.diag([place, place, yaw, 0.0, 0.0])
+        noise = np.diag([place, place, yaw, 0.0, 0.0, 0.0])
         for hypothesis in self.hypotheses:
             self._propagate(hypothesis, motion, noise)
 
@@ -162,6 +187,7 @@ class PoseFilter:
         c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
         turn = np.array([[c, s], [-s, c]])
         jacobian[:2, :2] = turn
+        jacobian[SADDLE:, SADDLE:] = turn.T @ turn.T  # by twice the angle, the other way
         moved = after_motion(state, motion)
         # A turn that was not measured moves the neighbour about the follower.
         swing = np.eye(SIZE)
@@ -180,30 +206,36 @@ class PoseFilter:
         p = self._p
         overshoot = max(0.0, overshoot)
         slip = p.slip_per_lean + p.slip_growth * overshoot**2
-        sidestep = p.neighbour_sidestep_sigma_m if sidestep_sigma_m is None else sidestep_sigma_m
+        # What the ground does to a step is a model of the default world; where it fails, it counts for less.
+        surprise = min(_MOST_SURPRISE, max(1.0, math.sqrt(self._misfit / p.calm_misfit)))
+        sidestep = p.neighbour_sidestep_sigma_m * surprise if sidestep_sigma_m is None else sidestep_sigma_m
+        self._stepped = True
         for hypothesis in self.hypotheses:
             state, covariance = hypothesis.state, hypothesis.covariance
             c, s = math.cos(state[YAW]), math.sin(state[YAW])
             along = np.array([[c, -s], [s, c]])
             # The neighbour slips as the follower does, and by as much more as it leans more.
-            aside = step.y_m - slip * state[CURVATURE] * state[Y] * abs(step.x_m)
+            lean = float(leans(state[None])[0][0])
+            aside = step.y_m - slip * lean * abs(step.x_m)
             jacobian = np.eye(SIZE)
             jacobian[:2, YAW] = along @ (-aside, step.x_m)
             hypothesis.state = state.copy()
             hypothesis.state[:2] += along @ (step.x_m, aside)
-            lean = state[CURVATURE] * state[Y]
             hypothesis.state[YAW] += p.turn_growth * overshoot**2 * lean * abs(step.x_m)
             noise = np.zeros((SIZE, SIZE))
             noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, sidestep**2]) @ along.T
             noise[YAW, YAW] = p.neighbour_turn_sigma_rad**2
-            noise[CURVATURE, CURVATURE] = p.curvature_drift_per_m**2
-            noise[TWIST, TWIST] = (0.2 * p.twist_sigma_rad) ** 2
+            for part in (CURVATURE, SADDLE, SKEW):
+                noise[part, part] = (p.curvature_drift_per_m * surprise) ** 2
             hypothesis.covariance = jacobian @ covariance @ jacobian.T + noise
 
     # --- looks ------------------------------------------------------------------------------------------------------
 
     def look(self, boxes: dict[int, Box]) -> None:
         """Take a look's boxes, at least one."""
+        if self._stepped and self.hypotheses:
+            self._misfit += _MISFIT_GAIN * (self.surprise(boxes) - self._misfit)
+        self._stepped = False
         if not self.hypotheses:
             self.hypotheses = self._guesses(boxes)
         self._take(view(boxes, self._edges))
@@ -251,7 +283,7 @@ class PoseFilter:
         guesses = []
         for degrees in range(-92, 93, 4):
             guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
-            ground = [self._p.curvature_sigma_per_m**2, self._p.twist_sigma_rad**2]
+            ground = [self._p.curvature_sigma_per_m**2, self._p.saddle_sigma_per_m**2, self._p.skew_sigma_per_m**2]
             covariance = np.diag([0.1**2, 0.1**2, math.radians(3.0) ** 2, *ground])
             guesses.append(Hypothesis(guess, covariance))
         return guesses

@@ -22,7 +22,7 @@ _BORDER_PX = 8.0
 
 @dataclass
 class Hypothesis:
-    """State (5,) and covariance (5, 5) as in `relative_pose`, and twice the negative log likelihood of all looks."""
+    """State (6,) and covariance (6, 6) as in `relative_pose`, and twice the negative log likelihood of all looks."""
 
     state: Vector
     covariance: Matrix
@@ -101,7 +101,7 @@ class LookUpdate:
         return float(np.sum(ratios**2 / strays)) + self._contradiction(state, seen)
 
     def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:
-        steps = np.diag([1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
+        steps = 1e-4 * np.eye(SIZE)
         found = self._model.edges(np.concatenate([state[None], state + steps, state - steps]), edges)
         return ((found[1 : SIZE + 1] - found[SIZE + 1 :]) / 2e-4).T, found[0]
 
