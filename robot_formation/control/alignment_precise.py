@@ -40,7 +40,7 @@ class PreciseParameters:
     """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
 
     u_tolerance_m: float = parameter(0.009, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
-    v_tolerance_m: float = parameter(0.0065, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    v_tolerance_m: float = parameter(0.006, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
     heading_tolerance_rad: float = parameter(
         math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
     )
@@ -48,7 +48,7 @@ class PreciseParameters:
         math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
     )
     first_share: float = parameter(
-        0.54, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
+        0.58, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
     )
     certain_rad: float = parameter(
         math.radians(0.8),

@@ -52,7 +52,7 @@ class FilterParameters:
         0.15, "Mean curvature of the ground between the robots", unit="1/m", low=1e-4, high=10.0
     )
     curvature_drift_per_m: float = parameter(
-        0.005,
+        0.0015,
         "Change of the curvatures with each step of the neighbour; more where steps surprise",
         unit="1/m",
         low=0.0,
@@ -87,7 +87,7 @@ class FilterParameters:
         high=1.0,
     )
     calm_misfit: float = parameter(
-        0.03,
+        0.12,
         "Misfit of the first look after a step, mean square by its expected scatter, up to which nothing surprises",
         low=1e-4,
         high=100.0,
@@ -207,7 +207,7 @@ class PoseFilter:
         overshoot = max(0.0, overshoot)
         slip = p.slip_per_lean + p.slip_growth * overshoot**2
         # What the ground does to a step is a model of the default world; where it fails, it counts for less.
-        surprise = min(_MOST_SURPRISE, max(1.0, math.sqrt(self._misfit / p.calm_misfit)))
+        surprise = min(_MOST_SURPRISE, max(1.0, self._misfit / p.calm_misfit))
         sidestep = p.neighbour_sidestep_sigma_m * surprise if sidestep_sigma_m is None else sidestep_sigma_m
         self._stepped = True
         for hypothesis in self.hypotheses:
