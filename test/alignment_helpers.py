@@ -17,7 +17,7 @@ _CORNERS = {TARGET: [0, 1, 2, 3], FRONT: [2, 3, 4, 5], REAR: [6, 7, 0, 1]}
 
 def state_of(x_m=0.0, y_m=FORMATION_DISTANCE_M, yaw_rad=0.0, curvature_per_m=BOWL_CURVATURE_PER_M):
     """The neighbour in the follower's frame."""
-    return np.array([x_m, y_m, yaw_rad, curvature_per_m, 0.0])
+    return np.array([x_m, y_m, yaw_rad, curvature_per_m, 0.0, 0.0])
 
 
 def blocks_of(state):
@@ -31,8 +31,8 @@ def _block(face, corners, seen, index):
     e = EDGES
     biases = {
         TARGET: (e.target_left_px + (0.5 if FRONT in seen else 0.0), e.target_right_px),
-        FRONT: (e.front_left_px, e.front_right_px),
-        REAR: (e.rear_left_px, e.rear_right_px),
+        FRONT: (e.front_left_px, e.front_right_px[-1]),
+        REAR: (e.rear_left_px[-1], 0.0),
     }[face]
     left, right = corners[:, 0].min() + biases[0], corners[:, 0].max() + biases[1]
     top, bottom = corners[:, 1].min() + e.target_top_px, corners[:, 1].max() + e.target_bottom_px

@@ -234,8 +234,18 @@ def test_formation_error_does_not_depend_on_where_the_formation_stands(place, ya
 
 
 def test_the_first_move_of_a_timestep_is_no_correction():
-    assert corrections_of([Stamped(0, Motion(1.0, 1.0, 1.0))]).movements == 0
-    assert corrections_of([]).u_m == 0
+    follower = FollowerRecord("follower_1", moved=(Stamped(0, Motion(1.0, 1.0, 1.0)),))
+    assert corrections_of(follower, [0]).movements == 0
+    assert corrections_of(follower, []).u_m == 0
+
+
+def test_a_move_along_v_and_one_along_u_are_two_movements_in_one_command_too():
+    moves = [Motion(), Motion(0.02, 0.0), Motion(0.02, 0.01), Motion(0.02, 0.01, 0.1), Motion()]
+    moved = tuple(Stamped(0, motion) for motion in moves)
+    told = FollowerRecord("follower_1", moved=moved, commands=tuple(moves))
+    assert corrections_of(told, range(5)).movements == 1 + 2 + 3 + 1
+    untold = FollowerRecord("follower_1", moved=moved)
+    assert corrections_of(untold, range(5)).movements == 4
 
 
 def test_bags_without_a_formation_are_refused(tmp_path):

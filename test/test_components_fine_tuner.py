@@ -30,7 +30,7 @@ def planar(motion, stamp_ns):
 
 @pytest.fixture
 def wire():
-    return wired("fine_tuner", "follower_1", look=LOOK)
+    return wired("fine_tuner", "follower_1", mode="paper", look=LOOK)
 
 
 def plain(sent):
@@ -72,7 +72,7 @@ def test_timesteps_0_and_1_on_messages(wire):
 
 
 def test_a_report_without_the_target_face_says_that_the_residual_is_no_estimate():
-    wire = wired("fine_tuner", "follower_1", look=LOOK, alignment={"max_moves": 1})
+    wire = wired("fine_tuner", "follower_1", mode="paper", look=LOOK, alignment={"max_moves": 1})
     begin(wire)
     front = [Block(FRONT, 158, 60, 40, 40)]
     wire.give("blocks", blocks(front, 30))
@@ -125,7 +125,7 @@ def test_answers_that_nobody_asked_for_warn_and_change_nothing(wire, topic, mess
 
 
 def test_a_lost_leader_ends_the_run_with_the_exit_code_for_it():
-    wire = wired("fine_tuner", "follower_1", look=LOOK, alignment={"max_empty_looks": 1})
+    wire = wired("fine_tuner", "follower_1", mode="paper", look=LOOK, alignment={"max_empty_looks": 1})
     wire.give(NEIGHBOUR, tick(0))
     assert plain(wire.give("blocks", blocks([], 10))) == [("alignment", "lost")]
     assert wire.component.exit_code == exit_codes.LOST == 3

@@ -14,7 +14,6 @@ from robot_formation.parameters import from_mapping
 
 PAGE = (Path(__file__).parent.parent / "docs" / "alignment.md").read_text(encoding="utf-8")
 IN_PLACE = state_of()
-BEHIND = state_of(x_m=0.05)
 
 
 class Watched:
@@ -24,7 +23,6 @@ class Watched:
         look = {"frames": 1, "stable_frames": 1}
         self.tuner = FineTuner(from_mapping(FineTunerParameters, {"mode": mode, "look": look}, where="test"))
         self.seen = set()
-        self.mode = mode
         self.now_ns = 0
 
     def event(self, name, actions_of):
@@ -37,7 +35,7 @@ class Watched:
         return actions
 
     def tick(self, timestep):
-        name = "tick 0" if timestep == 0 else f"tick ({self.mode})"
+        name = "tick 0" if timestep == 0 else "tick"
         self.event(name, lambda: self.tuner.neighbour_done(timestep))
 
     def frame(self, state):
@@ -62,8 +60,6 @@ class Watched:
 
     def timestep(self, number):
         self.tick(number)
-        if self.tuner.phase is Phase.SIGHT:
-            self.frame(BEHIND)
         self.moved(Motion(0.05))
         self.frame(IN_PLACE)
         if self.tuner.phase is Phase.MOVE:
@@ -82,8 +78,6 @@ def observed():
         run.timestep(1)
         run.event("prediction", lambda run=run: run.tuner.prediction(Motion(0.05)))
         run.tick(2)
-        if mode == "precise":
-            run.frame(BEHIND)
         run.moved(Motion(0.02))
         run.frame(state_of(x_m=0.03))
         run.moved(Motion(0.03))
@@ -92,13 +86,7 @@ def observed():
         dead.tick(0)
         for _ in range(4):
             dead.stalled()
-        dead_in_sight = Watched(mode)
-        dead_in_sight.tick(0)
-        dead_in_sight.frame(IN_PLACE)
-        dead_in_sight.tick(1)
-        for _ in range(4):
-            dead_in_sight.stalled()
-        seen |= run.seen | dead.seen | dead_in_sight.seen
+        seen |= run.seen | dead.seen
     return seen
 
 

@@ -28,7 +28,7 @@ FRAMES = 2
 
 def parameters(**values):
     look = {"frames": FRAMES, "stable_frames": 2, "extra_frames": 3, "max_extensions": 2}
-    return from_mapping(FineTunerParameters, {"look": look, **values}, where="test")
+    return from_mapping(FineTunerParameters, {"mode": "paper", "look": look, **values}, where="test")
 
 
 class Script:

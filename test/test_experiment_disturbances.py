@@ -2,6 +2,8 @@
 
 import itertools
 import math
+from collections import deque
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,7 +91,6 @@ def test_a_neighbour_that_is_gone_for_good_is_lost_after_a_bound():
     assert words(trial).count("search") <= 10
 
 
-@pytest.mark.xfail(reason="a first estimate that is made anew from a half covered face can lead too close")
 def test_a_marker_that_is_partly_covered_for_a_while_is_waited_for():
     trial = align(spoil=during(LOOK, 3 * LOOK, half_covered))
     assert_in_formation(trial)
@@ -122,32 +123,33 @@ def test_light_that_changes_is_no_matter():
 
 def test_blocks_that_flicker_do_not_lead_astray():
     rng = np.random.default_rng(5)
-    trial = align(tamper=lambda blocks, stamp_ns: [block for block in blocks if rng.random() > 0.15])
+    trial = align(tamper=lambda frame: [replace(frame, blocks=[b for b in frame.blocks if rng.random() > 0.15])])
     assert_in_formation(trial)
 
 
 def test_a_missing_frame_is_asked_for_again():
     count = iter(range(10**9))
-    trial = align(tamper=lambda blocks, stamp_ns: None if next(count) % 7 == 3 else blocks)
+    trial = align(tamper=lambda frame: [] if next(count) % 7 == 3 else [frame])
     assert_in_formation(trial)
 
 
-@pytest.mark.xfail(reason="with frames that lag, the first alignment's heading can be 3 degrees off, 2 cm along v")
-def test_a_late_frame_does_not_count():
-    """After each move the first frame shows what was seen before the move."""
-    kept = []
+@pytest.mark.parametrize("lag", [1, 4, LOOK + 8])
+def test_late_frames_do_not_count(lag):
+    """Frames arrive when `lag` newer ones have been taken: the first after a move still show what was before it."""
+    under_way = deque()
 
-    def late(blocks, stamp_ns):
-        kept.append(blocks)
-        return kept[-5] if len(kept) > 5 else blocks
+    def late(frame):
+        under_way.append(frame)
+        return [under_way.popleft()] if len(under_way) > lag else []
 
     trial = align(tamper=late)
     assert_in_formation(trial)
+    assert "hold" not in words(trial)
 
 
 def test_a_dead_camera_loses_the_neighbour():
     count = iter(range(10**9))
-    trial = align(tamper=lambda blocks, stamp_ns: None if next(count) > LOOK + 5 else blocks)
+    trial = align(tamper=lambda frame: [] if next(count) > LOOK + 5 else [frame])
     assert trial.outcome == "lost"
 
 
@@ -174,7 +176,7 @@ def states(analysis_or_record):
 
 
 def test_a_neighbour_that_vanishes_in_a_run_is_lost_and_the_bag_is_complete(tmp_path, monkeypatch):
-    result, analysis = run(tmp_path, monkeypatch, lambda number, blocks: blocks if number < 12 * LOOK else [])
+    result, analysis = run(tmp_path, monkeypatch, lambda number, blocks: blocks if number < 5 * LOOK else [])
     assert result.exit_code == exit_codes.LOST
     assert analysis.outcome == "lost"
     assert 1 <= analysis.followers[0].totals["timesteps_finished"] < 4

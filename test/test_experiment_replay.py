@@ -26,6 +26,7 @@ def run(tmp_path_factory):
     """The bag of a short run with pictures."""
     bag = tmp_path_factory.mktemp("replay") / "run"
     settings = ["seed=3", f"leader.timesteps={TIMESTEPS}", "world.camera.mode=on_demand", "predictor.forgetting=0.9"]
+    settings.append("fine_tuner.mode=paper")
     scenario = scenarios.override(scenarios.load_track("two"), settings)
     run_in_process(scenario, bag, run_metadata(scenario), images=True)
     return bag
@@ -67,6 +68,13 @@ def test_the_same_parameters_give_the_same_answers(recording, replay):
     assert found.identical
     assert found.changed == 0
     assert len(found.rows) >= TIMESTEPS
+
+
+def test_a_precise_alignment_decides_as_it_did(formation_run):
+    with read_bag(formation_run) as bag:
+        (found,) = replay_fine_tuner(Recording(bag), {})
+    assert found.identical
+    assert any(row.recorded.corrections for row in found.rows)
 
 
 def test_a_predictor_gets_what_was_commanded_too_and_its_state_file_is_left_alone(formation_run, tmp_path):
@@ -170,8 +178,8 @@ def test_other_versions_and_parameters_that_are_gone_are_noted(run, tmp_path):
         assert words in text
 
 
-def test_a_bag_without_parameters_is_replayed_with_those_of_config(run, tmp_path):
-    with read_bag(copied(run, tmp_path / "bag", details={})) as opened:
+def test_a_bag_without_parameters_is_replayed_with_those_of_config(formation_run, tmp_path):
+    with read_bag(copied(formation_run, tmp_path / "bag", details={})) as opened:
         bare = Recording(opened)
         assert replay_fine_tuner(bare, {})[0].identical
     assert "those of config/ are taken" in bare.notes[0]

@@ -46,7 +46,7 @@ def scenario(path, *settings):
 
 def tuned_component(path):
     kind = KINDS["fine_tuner"]
-    values = scenario(path).robot_parameters("fine_tuner", "follower_1")
+    values = {**scenario(path).robot_parameters("fine_tuner", "follower_1"), "mode": "paper"}
     return kind.component_class()(from_mapping(kind.parameter_class(), values, where="test"), Place("follower_1"))
 
 

@@ -188,12 +188,15 @@ def test_edges_of_neighbouring_faces_count_beside_the_target_block_only():
     wide = reported((TARGET, 152, 200), (FRONT, 202, 229))
     narrow = reported((TARGET, 152, 200), (FRONT, 202, 208))
     rear = reported((TARGET, 152, 200), (REAR, 123, 150))
-    found = edge_biases([(look, faces) for look in (wide, narrow, rear) for _ in range(3)] + [(reported(), faces)])
+    small = Sighting(0.6, 0.0, 0.0, True, 22, (Block(TARGET, 176, 65, 48, 30), Block(REAR, 136.5, 65, 27, 30)))
+    looks = [(look, faces) for look in (wide, narrow, rear, small) for _ in range(3)]
+    found = edge_biases([*looks, (reported(), faces)])
     means = {name: bias.mean_px for name, bias in found.items()}
     assert means["front_left_px"] == 2.0
-    assert means["front_right_px"] == -1.0
-    assert means["narrow_right_px"] == -22.0
-    assert means["rear_left_px"] == 3.0
-    assert found["target_left_px"].views == 3  # the rear looks
-    assert set(found) <= {field.name for field in dataclasses.fields(EdgeParameters)}
+    assert means["front_right_px[3]"] == -1.0
+    assert means["front_right_px[0]"] == -22.0
+    assert means["rear_left_px[3]"] == 3.0
+    assert means["rough_rear_left_px"] == 3.0
+    assert found["target_left_px"].views == 6  # the looks with a Rear block
+    assert {name.split("[")[0] for name in found} <= {field.name for field in dataclasses.fields(EdgeParameters)}
     assert edge_biases([(wide, faces)]) == {}  # one look has no scatter

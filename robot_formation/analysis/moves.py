@@ -3,6 +3,8 @@
 moves by axis
     of the moves after a timestep's prediction move, how many had a leg along u, a leg along v and a turn by their
     command (more than 0.1 mm, or 0.1 mrad); a move of several legs counts for each of them.
+movements
+    those moves, each counted as often as it has legs: a move along v and one along u are two, in one command or two.
 moves by kind
     the same moves by what the fine-tuner said of them: `correct: REASON` or `search: REASON`.
 loss
@@ -134,15 +136,38 @@ def _texts(follower: FollowerRecord, t: int) -> list[str]:
     return [text for timestep, text in _with_timestep(follower.states) if timestep == t]
 
 
+def movements_of(follower: FollowerRecord, indices: Sequence[int]) -> int:
+    """Count a timestep's movements after its prediction move: a move of several legs counts as that many.
+
+    Args:
+        follower: whose moves.
+        indices: of the timestep's moves in `follower.moved`; the first one is the prediction move and isn't counted.
+    """
+    return sum(max(1, len(legs or ())) for legs in _legs(follower, indices[1:]))
+
+
 def _axes(follower: FollowerRecord, indices: Sequence[int]) -> dict[str, int] | None:
-    """Count by commanded axes; every command is answered by one measured move, so they pair by their order."""
-    if not 0 <= len(follower.commands) - len(follower.moved) <= 1:
-        return None
     counts = dict.fromkeys(AXES, 0)
-    for index in indices:
-        for axis, size in zip(AXES, _sizes(follower.commands[index]), strict=True):
-            counts[axis] += size > _LEAST
+    for legs in _legs(follower, indices):
+        if legs is None:
+            return None
+        for axis in legs:
+            counts[axis] += 1
     return counts
+
+
+def _legs(follower: FollowerRecord, indices: Sequence[int]) -> Iterator[tuple[str, ...] | None]:
+    """Yield the axes of each move's command, None where no commands are known.
+
+    Every command is answered by one measured move, so they pair by their order.
+    """
+    known = 0 <= len(follower.commands) - len(follower.moved) <= 1
+    for index in indices:
+        if not known:
+            yield None
+            continue
+        sizes = _sizes(follower.commands[index])
+        yield tuple(axis for axis, size in zip(AXES, sizes, strict=True) if size > _LEAST)
 
 
 def _sizes(motion: Motion) -> tuple[float, float, float]:

@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.analysis.errors import AnalysisError
-from robot_formation.analysis.moves import Moves, move_totals, moves_of
-from robot_formation.analysis.record import FollowerRecord, RunRecord, Stamped
+from robot_formation.analysis.moves import Moves, move_totals, movements_of, moves_of
+from robot_formation.analysis.record import FollowerRecord, RunRecord
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
 from robot_formation.control.motion import Motion
 from robot_formation.names import beacon_neighbour
@@ -151,7 +151,7 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
     unfinished = None
     if opened > finished:
         indices = _moves(record, follower, finished + 1)
-        unfinished = corrections_of([follower.moved[index] for index in indices])
+        unfinished = corrections_of(follower, indices)
     values = totals(timesteps)
     counts = [timestep.corrections.movements for timestep in timesteps]
     values.update(move_totals([timestep.moves for timestep in timesteps], counts, follower))
@@ -231,14 +231,14 @@ def formation_error_uv_m(
     return -(left + distance_m), forward
 
 
-def corrections_of(found: Sequence[Stamped]) -> Corrections:
+def corrections_of(follower: FollowerRecord, indices: Sequence[int]) -> Corrections:
     """Sum up a timestep's moves without the first, which is the prediction move."""
-    motions = [move.motion for move in found[1:]]
+    motions = [follower.moved[index].motion for index in indices[1:]]
     return Corrections(
         u_m=sum(abs(motion.u_m) for motion in motions),
         v_m=sum(abs(motion.v_m) for motion in motions),
         turn_rad=sum(abs(motion.yaw_rad) for motion in motions),
-        movements=len(motions),
+        movements=movements_of(follower, indices),
     )
 
 
@@ -252,7 +252,7 @@ def _timestep(record: RunRecord, follower: FollowerRecord, t: int) -> Timestep:
         t=t,
         predicted=predicted if predicted and predicted.finite else None,
         moved=displacement.motion,
-        corrections=corrections_of([follower.moved[index] for index in indices]),
+        corrections=corrections_of(follower, indices),
         moves=moves_of(follower, indices, t),
         residual=residual if residual and residual.finite else None,
         error_uv_m=error_uv,

@@ -112,8 +112,8 @@ def vision_text(result: VisionResult) -> str:
     ]
     lines += ["", "edges of whole faces, reported minus true [px]: mean, scatter of one look, looks"]
     for name, bias in result.edges.items():
-        said = name.removesuffix("_px").replace("_", " ")
-        lines.append(f"  {said:13} {bias.mean_px:+6.2f} {bias.scatter_px:6.2f} {bias.views:5d}")
+        said = name.replace("_px", "").replace("_", " ")
+        lines.append(f"  {said:18} {bias.mean_px:+6.2f} {bias.scatter_px:6.2f} {bias.views:5d}")
     return "\n".join(lines)
 
 

@@ -16,14 +16,11 @@ Frames = Sequence[Sequence[Block]]
 class AlignmentMode(Protocol):
     """One follower's use of its camera, over all timesteps."""
 
-    looks_before: bool
-    """Whether it wants a look before the prediction move."""
-
     def restart(self, timestep: int) -> None:
         """Begin a timestep: the neighbour has made its step (timestep 0: nobody has moved yet)."""
 
-    def turn_before(self, frames: Frames) -> float:
-        """Take the look before the prediction move; returns the turn [rad] to make with it."""
+    def turn(self) -> float:
+        """Tell the turn [rad] to make with the prediction move."""
 
     def moved(self, asked: Motion, motion: Motion) -> None:
         """Take a move as it was asked for, and as the encoder wheels measured it."""
@@ -38,8 +35,6 @@ class AlignmentMode(Protocol):
 class PaperMode:
     """`mode: paper` behind the protocol: every timestep is a new alignment, and only a look's last frame counts."""
 
-    looks_before = False
-
     def __init__(self, parameters: AlignmentParameters) -> None:
         self._p = parameters
         self._alignment = PaperAlignment(parameters)
@@ -49,8 +44,8 @@ class PaperMode:
         """See `AlignmentMode`."""
         self._alignment = PaperAlignment(self._p)
 
-    def turn_before(self, frames: Frames) -> float:
-        """See `AlignmentMode`; never asked for."""
+    def turn(self) -> float:
+        """See `AlignmentMode`; the rule table leaves the heading alone."""
         return 0.0
 
     def moved(self, asked: Motion, motion: Motion) -> None:

@@ -14,17 +14,22 @@ from robot_formation.control.leader_search import LeaderSearch, SearchParameters
 from robot_formation.control.marker_view import EdgeParameters, mean_boxes
 from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 from robot_formation.control.pose_filter import FilterParameters, PoseFilter
-from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y
+from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y, after_motion
 from robot_formation.parameters import parameter
 
-_SURPRISE = 12.0
+_SURPRISE = 6.0
 """Mean square of a look's innovations by their scatter from which on something is in the way."""
 _VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
 _VANTAGE_BESIDE_M = 0.312
 _VANTAGE_NEAR = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
-_LAST_MOVES = 5
+_SPARE_MOVES = 2
+"""Moves left over for last corrections."""
+_ENOUGH_MOVES = 6
+"""As long as so many are left, the way back isn't counted."""
+_TRIFLE, _FIRST_TRIFLE = 0.8, 0.5
+"""Share of the tolerance up to which an offset is left alone while the other axis is corrected; in timestep 0."""
 _CLUELESS_RAD = 0.08
 _ASIDE_RAD = 0.25
 _FIRST_SIDESTEP_SIGMA_M = 0.002
@@ -34,8 +39,8 @@ _FIRST_SIDESTEP_SIGMA_M = 0.002
 class PreciseParameters:
     """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
 
-    u_tolerance_m: float = parameter(0.007, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
-    v_tolerance_m: float = parameter(0.005, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    u_tolerance_m: float = parameter(0.009, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
+    v_tolerance_m: float = parameter(0.006, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
     heading_tolerance_rad: float = parameter(
         math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
     )
@@ -43,7 +48,7 @@ class PreciseParameters:
         math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
     )
     first_share: float = parameter(
-        0.7, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
+        0.58, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
     )
     certain_rad: float = parameter(
         math.radians(0.8),
@@ -76,8 +81,6 @@ class PreciseParameters:
 class PreciseAlignment:
     """Keeps the estimate over the timesteps; one decision a look."""
 
-    looks_before = True
-
     def __init__(self, parameters: PreciseParameters, first_step_m: float) -> None:
         self._p = parameters
         self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
@@ -102,13 +105,10 @@ class PreciseAlignment:
                 None if self._experience.drives else _FIRST_SIDESTEP_SIGMA_M,
             )
 
-    def turn_before(self, frames: Frames) -> float:
-        """Look before the prediction move; returns the turn [rad] that goes with it."""
-        boxes = self._boxes(frames)
+    def turn(self) -> float:
+        """Tell the turn [rad] to make with the prediction move."""
         if not self._filter.known:
             return 0.0
-        if TARGET in boxes and self._filter.surprise(boxes) < _SURPRISE:
-            self._filter.look(boxes)
         heading = way_to(self._filter.best.state, FORMATION).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
 
@@ -125,8 +125,8 @@ class PreciseAlignment:
     def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
         boxes = self._boxes(frames)
-        strange = self._filter.known and self._filter.surprise(boxes) >= _SURPRISE
-        if strange and self._search.looks >= self._p.search.hold_looks:
+        strange = bool(boxes) and self._strange(boxes)
+        if strange and self._search.looks >= self._p.search.hold_looks and self._filter.whole(boxes):
             # What doesn't fit for so long is not in the way: the neighbour, or the follower, was moved.
             self._filter.forget()
             strange = False
@@ -136,7 +136,7 @@ class PreciseAlignment:
             return decision
         self._search.found()
         first = not self._filter.known
-        self._filter.look(boxes, doubt=self._timestep == 0)
+        self._filter.look(boxes)
         if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             self._vantages = []
@@ -145,10 +145,13 @@ class PreciseAlignment:
     def _correct(self) -> Decision:
         p, state = self._p, self._filter.best.state
         unsure = self._filter.yaw_sigma_rad > p.certain_rad
-        searching = unsure and self._timestep == 0 and self._moves < p.max_moves - _LAST_MOVES and self._vantages != []
-        if not searching and self._within(way_to(state, FORMATION)):
-            return Decision(Verdict.ALIGNED, reason="inside the tolerances")
-        motion, reason = self._next(state, searching)
+        motion, reason = Motion(), ""
+        if unsure and self._timestep == 0 and self._vantages != []:
+            motion, reason = self._to_see_more(state)
+        if motion == Motion():
+            if self._within(way_to(state, FORMATION)):
+                return Decision(Verdict.ALIGNED, reason="inside the tolerances")
+            motion, reason = self._to_formation(state)
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
         if self._moves + legs(motion) > p.max_moves:
@@ -156,26 +159,51 @@ class PreciseAlignment:
         self._moves += legs(motion)
         return Decision(Verdict.MOVE, self._experience.compensated(motion), reason)
 
-    def _next(self, state: Vector, searching: bool) -> tuple[Motion, str]:
-        """Choose the next motion and say why."""
-        p = self._p
+    def _to_see_more(self, state: Vector) -> tuple[Motion, str]:
+        """Choose the next motion to a place from where the heading shows; none if too few moves would be left."""
+        motion, reason = self._first(state)
+        if motion != Motion():
+            return motion, reason
+        states = self._filter.likely()
+        for vantage in self._places(state):
+            motion = self._without_trifles(self._approach.next(states, vantage), _VANTAGE_NEAR)
+            if motion == Motion():
+                continue
+            left = self._without_trifles(way_to(after_motion(state, motion), FORMATION), self._trifle())
+            needed = legs(motion) + self._approach.moves(left) + _SPARE_MOVES
+            affordable = self._p.max_moves - self._moves >= min(needed, _ENOUGH_MOVES)
+            return (motion, "to see two faces") if affordable else (Motion(), "")
+        return Motion(), ""
+
+    def _to_formation(self, state: Vector) -> tuple[Motion, str]:
+        """Choose the next motion to the formation position and say why."""
+        motion, reason = self._first(state)
+        if motion != Motion():
+            return motion, reason
+        motion = self._approach.next(self._filter.likely(), FORMATION)
+        return self._without_trifles(motion, self._trifle()), "to the formation position"
+
+    def _first(self, state: Vector) -> tuple[Motion, str]:
+        """Choose what comes before any goal: to keep clear, and to face a marker whose heading is hardly known."""
         states = self._filter.likely()
         if not self._approach.apart(state) and (away := self._approach.away(states)) != Motion():
             return away, "too close: away along u"
         if self._filter.yaw_sigma_rad > _CLUELESS_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
             return self._approach.face(states), "turn towards the marker"
-        if searching:
-            for vantage in self._places(state):
-                motion = self._without_trifles(self._approach.next(states, vantage), _VANTAGE_NEAR)
-                if motion != Motion():
-                    return motion, "to see two faces"
-        share = 0.5 if self._timestep > 0 else 0.5 * p.first_share
-        trifle = Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
-        return self._without_trifles(self._approach.next(states, FORMATION), trifle), "to the formation position"
+        return Motion(), ""
+
+    def _trifle(self) -> Motion:
+        p = self._p
+        share = _TRIFLE if self._timestep > 0 else _FIRST_TRIFLE * p.first_share
+        return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
 
     def _boxes(self, frames: Frames) -> dict[int, Box]:
         last = frames[-self._p.averaged_frames :]
         return mean_boxes([self._filter.plausible(blocks) for blocks in last])
+
+    def _strange(self, boxes: dict[int, Box]) -> bool:
+        """Whether a look shows no whole marker, or one where none is expected."""
+        return not self._filter.whole(boxes) or (self._filter.known and self._filter.surprise(boxes) >= _SURPRISE)
 
     def _placed(self, state: Vector) -> bool:
         return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m

@@ -83,6 +83,13 @@ class Approach:
         motion = Motion(y_m=-_AWAY_M)
         return motion if all(self._clear(state, motion) for state in states) else Motion()
 
+    def moves(self, way: Motion) -> int:
+        """Count the corrections, axes apart, that a way takes at least."""
+        c, s = math.cos(way.yaw_rad), math.sin(way.yaw_rad)
+        forward, left = c * way.x_m + s * way.y_m, c * way.y_m - s * way.x_m
+        parts = (forward / self._p.max_v_m, left / self._p.max_u_m, way.yaw_rad / self._p.max_turn_rad)
+        return sum(math.ceil(abs(part) - _ROUNDING_M) for part in parts)
+
     def apart(self, state: Vector) -> bool:
         """Whether the bodies keep their distance."""
         return self._gap(state) >= self._p.clearance_m

@@ -16,6 +16,8 @@ _SLIP_SIGMA, _BESIDE_SIGMA_M, _NOISE_M = 0.05, 0.002, 0.0007
 _OVERSHOOT_GAIN = 0.4
 _MOST_OVERSHOOT = 0.5
 _SHORT_DRIVE_M = 0.06
+_NO_LEG_M = 1e-6
+"""Up to here a component is what rounding leaves of a leg that wasn't asked for."""
 _MOST_SHORT_M = 0.006
 _SHORT_GAIN = 0.5
 
@@ -78,12 +80,12 @@ class DriveExperience:
         self._covariance = covariance * np.outer(scale, scale)
 
     def _longer(self, axis: str, length: float) -> float:
-        if not 0.0 < abs(length) < _SHORT_DRIVE_M:
+        if not _NO_LEG_M < abs(length) < _SHORT_DRIVE_M:
             return length
         return length + math.copysign(self._short.get((axis, length > 0.0), 0.0), length)
 
     def _learn(self, axis: str, want: float, missing: float) -> None:
-        if 0.0 < abs(want) < _SHORT_DRIVE_M:
+        if _NO_LEG_M < abs(want) < _SHORT_DRIVE_M:
             known = self._short.get((axis, want > 0.0), 0.0)
             mean = known + _SHORT_GAIN * (missing - known)
             self._short[axis, want > 0.0] = max(0.0, min(_MOST_SHORT_M, mean))

@@ -20,7 +20,8 @@ _MARGIN_PX = 5.0
 _SIZE_PX = (316.0, 208.0)
 _LEVEL_PX = 1.0
 """Slant of an edge up to which its row is one."""
-_NARROW_PX = EdgeParameters().narrow_px
+_BANDS = EdgeParameters()
+"""Where the values for other widths begin."""
 _FEWEST = 3
 
 
@@ -67,9 +68,11 @@ def _errors(boxes: Mapping[int, Box], faces: Mapping[int, Corners]) -> Iterator[
     if target is not None and front is not None and _whole(faces.get(FRONT)):
         left, right, _, _ = _edges(faces[FRONT])
         yield "front_left_px", front.left - left
-        yield "narrow_right_px" if front.width < _NARROW_PX else "front_right_px", front.right - right
+        band = f"front_right_px[{_BANDS.front_band(front.width)}]"
+        yield band if _BANDS.clear(target) else "rough_front_right_px", front.right - right
     if target is not None and rear is not None and _whole(faces.get(REAR)):
-        yield "rear_left_px", rear.left - _edges(faces[REAR])[0]
+        band = f"rear_left_px[{_BANDS.rear_band(rear.width)}]"
+        yield band if _BANDS.clear(target) else "rough_rear_left_px", rear.left - _edges(faces[REAR])[0]
 
 
 def _edges(corners: Corners) -> tuple[float, float, float | None, float | None]:

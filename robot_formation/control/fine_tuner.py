@@ -45,7 +45,7 @@ class LookParameters:
 class FineTunerParameters:
     """Parameters of the follower's fine-tuning controller."""
 
-    mode: str = parameter("paper", "How the camera's blocks are used", choices=("paper", "precise"))
+    mode: str = parameter("precise", "How the camera's blocks are used", choices=("paper", "precise"))
     first_step_m: float = parameter(
         0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
     )
@@ -121,7 +121,6 @@ class Phase(Enum):
 
     NEIGHBOUR = auto()
     MOVE = auto()
-    SIGHT = auto()
     LOOK = auto()
     PREDICTION = auto()
     LOST = auto()
@@ -179,7 +178,7 @@ class FineTuner:
 
     def frame(self, blocks: Sequence[Block], stamp_ns: int) -> list[Action]:
         """The camera's blocks of one frame. Only frames later than the last fact count."""
-        if self._phase not in (Phase.LOOK, Phase.SIGHT) or stamp_ns <= self._look_from_ns:
+        if self._phase is not Phase.LOOK or stamp_ns <= self._look_from_ns:
             return []
         self._resent = 0
         self._frames.append(blocks)
@@ -190,13 +189,11 @@ class FineTuner:
             self._extensions += 1
             self._frames_wanted += self._p.look.extra_frames
             return [RequestFrames(self._p.look.extra_frames)]
-        if self._phase is Phase.SIGHT:
-            return self._go(self._alignment.turn_before(self._frames))
         return self._decide(self._alignment.assess(self._frames))
 
     def stalled(self) -> list[Action]:
         """Nothing comes any more: ask again for missing frames; a camera that stays silent loses the leader."""
-        if self._phase not in (Phase.LOOK, Phase.SIGHT):
+        if self._phase is not Phase.LOOK:
             return []
         self._resent += 1
         if self._resent > self._p.look.max_requests:
@@ -225,17 +222,17 @@ class FineTuner:
         self._actuation_error = None
         if self.timestep == 0:
             return [State("align"), *self._look()]
-        return self._look(Phase.SIGHT) if self._alignment.looks_before else self._go(0.0)
+        return self._go()
 
-    def _go(self, turn_rad: float) -> list[Action]:
-        """Make the prediction move, and turn by what the look before it calls for."""
+    def _go(self) -> list[Action]:
+        """Make the prediction move, and take a known heading error out with it."""
         wish = self._planned()
         motion = Motion.from_uv(
             max(-self._p.max_u_m, min(self._p.max_u_m, wish.u_m)), max(-self._p.max_v_m, min(self._p.max_v_m, wish.v_m))
         )
         self._planned_move = motion
         collecting = self.timestep <= COLLECTION_TIMESTEPS
-        move = Motion(motion.x_m, motion.y_m, turn_rad)
+        move = Motion(motion.x_m, motion.y_m, self._alignment.turn())
         actions: list[Action] = [State("collect" if collecting else "predict"), *self._move(move)]
         if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
             actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"))
@@ -248,8 +245,8 @@ class FineTuner:
             return self._previous
         return self._prediction
 
-    def _look(self, phase: Phase = Phase.LOOK) -> list[Action]:
-        self._phase = phase
+    def _look(self) -> list[Action]:
+        self._phase = Phase.LOOK
         self._frames = []
         self._frames_wanted = self._p.look.frames
         self._extensions = 0

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box, hulls
-from robot_formation.parameters import parameter
+from robot_formation.parameters import ParameterError, parameter
 from robot_formation.vision.block import Block
 
 PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX = 316.0, 208.0
@@ -27,44 +28,115 @@ class EdgeParameters:
     target_top_px: float = parameter(1.25, "Bias of its upper edge", unit="px", low=-20.0, high=20.0)
     target_bottom_px: float = parameter(-1.15, "Bias of its lower edge", unit="px", low=-20.0, high=20.0)
     front_left_px: float = parameter(2.3, "Bias of the Front block's left edge", unit="px", low=-20.0, high=20.0)
-    front_right_px: float = parameter(-0.5, "Bias of its right edge", unit="px", low=-20.0, high=20.0)
-    narrow_right_px: float = parameter(
-        -2.7, "Bias of the right edge of a narrow Front block", unit="px", low=-20.0, high=20.0
-    )
-    narrow_px: float = parameter(10.0, "Reported width below which a block is narrow", unit="px", low=0.0, high=100.0)
-    rear_left_px: float = parameter(3.05, "Bias of the Rear block's left edge", unit="px", low=-20.0, high=20.0)
-    rear_right_px: float = parameter(
-        0.1, "Bias of its right edge where no Target block follows", unit="px", low=-20.0, high=20.0
-    )
-    column_sigma_px: float = parameter(0.9, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
-    far_column_sigma_px: float = parameter(
-        0.9, "Scatter of the outer edges of Front and Rear of middling width", unit="px", low=0.01, high=20.0
-    )
-    poor_column_sigma_px: float = parameter(
-        1.7,
-        "Scatter of the outer edges of Front and Rear where they are narrow or wide",
+    front_widths_px: tuple[float, ...] = parameter(
+        (10.0, 13.0, 18.0),
+        "Reported widths of the Front block where the error of its right edge jumps, ascending: "
+        "the detector goes along a row in strides",
         unit="px",
-        low=0.01,
+        low=0.0,
+        high=316.0,
+    )
+    front_right_px: tuple[float, ...] = parameter(
+        (-2.0, -0.2, -1.1, -0.3),
+        "Bias of its right edge below the first of these widths, between them and above the last",
+        unit="px",
+        low=-20.0,
         high=20.0,
     )
-    wide_px: float = parameter(20.0, "Reported width from which on they are wide", unit="px", low=0.0, high=300.0)
+    front_right_sigma_px: tuple[float, ...] = parameter(
+        (1.7, 0.9, 1.4, 0.9), "Scatter of its right edge, likewise", unit="px", low=0.01, high=20.0
+    )
+    rear_widths_px: tuple[float, ...] = parameter(
+        (13.0, 17.0, 21.0),
+        "Reported widths of the Rear block where the error of its left edge jumps, ascending",
+        unit="px",
+        low=0.0,
+        high=316.0,
+    )
+    rear_left_px: tuple[float, ...] = parameter(
+        (3.5, 2.5, 3.4, 2.6),
+        "Bias of its left edge below the first of these widths, between them and above the last",
+        unit="px",
+        low=-20.0,
+        high=20.0,
+    )
+    rear_left_sigma_px: tuple[float, ...] = parameter(
+        (0.9, 1.1, 0.9, 1.0), "Scatter of its left edge, likewise", unit="px", low=0.01, high=20.0
+    )
+    clear_height_px: float = parameter(
+        44.0,
+        "Height of the Target block from which on these values hold; smaller is too far away",
+        unit="px",
+        low=0.0,
+        high=208.0,
+    )
+    clear_ratio: float = parameter(
+        0.85, "Width by height of the Target block from which on they hold; narrower is too oblique", low=0.0, high=10.0
+    )
+    rough_front_right_px: float = parameter(
+        -0.8, "Bias of the Front block's right edge in other views", unit="px", low=-20.0, high=20.0
+    )
+    rough_rear_left_px: float = parameter(
+        3.7, "Bias of the Rear block's left edge in other views", unit="px", low=-20.0, high=20.0
+    )
+    rough_sigma_px: float = parameter(1.6, "Scatter of both in other views", unit="px", low=0.01, high=20.0)
+    column_sigma_px: float = parameter(0.9, "Scatter of a face's nearer edges", unit="px", low=0.01, high=20.0)
     sliver_px: float = parameter(
-        4.8,
+        5.6,
         "Bias of the Target block's right edge beside a Front face too narrow to be reported",
         unit="px",
         low=-20.0,
         high=20.0,
     )
-    sliver_from_px: float = parameter(3.0, "Width of that face at which it begins", unit="px", low=0.0, high=50.0)
-    sliver_to_px: float = parameter(6.5, "Width of that face from which on it is full", unit="px", low=0.0, high=50.0)
+    sliver_from_px: float = parameter(4.0, "Width of that face at which it begins", unit="px", low=0.0, high=50.0)
+    sliver_to_px: float = parameter(7.5, "Width of that face from which on it is full", unit="px", low=0.0, high=50.0)
     row_sigma_px: float = parameter(0.45, "Scatter of upper and lower edges", unit="px", low=0.01, high=20.0)
     front_shows_px: float = parameter(
-        9.0, "Width from which on the Front face is always reported", unit="px", low=1.0, high=100.0
+        14.0, "Width from which on the Front face is always reported", unit="px", low=1.0, high=100.0
     )
     rear_shows_px: float = parameter(
-        15.0, "Width from which on the Rear face is always reported", unit="px", low=1.0, high=100.0
+        15.5, "Width from which on the Rear face is always reported", unit="px", low=1.0, high=100.0
     )
     hidden_sigma_px: float = parameter(1.5, "How sharp these bounds are", unit="px", low=0.01, high=20.0)
+
+    def __post_init__(self) -> None:
+        """Check that the widths ascend and part as many values as there are."""
+        for face, side in (("front", "right"), ("rear", "left")):
+            widths = getattr(self, f"{face}_widths_px")
+            lengths = {len(getattr(self, f"{face}_{side}_{name}")) for name in ("px", "sigma_px")}
+            if lengths != {len(widths) + 1} or list(widths) != sorted(widths):
+                raise ParameterError(
+                    f"fine_tuner: '{face}_widths_px' must ascend, and '{face}_{side}_px' and '{face}_{side}_sigma_px' "
+                    "have one value more than it"
+                )
+
+    def clear(self, target: Box | None) -> bool:
+        """Whether the marker is near and frontal enough for the finer values of its outer edges."""
+        if target is None or target.height < self.clear_height_px:
+            return False
+        return target.width >= self.clear_ratio * target.height
+
+    def front_band(self, width_px: float) -> int:
+        """Tell which values hold for a Front block of this reported width."""
+        return bisect_right(self.front_widths_px, width_px)
+
+    def rear_band(self, width_px: float) -> int:
+        """Tell which values hold for a Rear block of this reported width."""
+        return bisect_right(self.rear_widths_px, width_px)
+
+    def front_right(self, front: Box, target: Box | None) -> tuple[float, float]:
+        """Tell bias and scatter of the Front block's right edge, px."""
+        if not self.clear(target):
+            return self.rough_front_right_px, self.rough_sigma_px
+        band = self.front_band(front.width)
+        return self.front_right_px[band], self.front_right_sigma_px[band]
+
+    def rear_left(self, rear: Box, target: Box | None) -> tuple[float, float]:
+        """Tell bias and scatter of the Rear block's left edge, px."""
+        if not self.clear(target):
+            return self.rough_rear_left_px, self.rough_sigma_px
+        band = self.rear_band(rear.width)
+        return self.rear_left_px[band], self.rear_left_sigma_px[band]
 
 
 @dataclass(frozen=True)
@@ -135,13 +207,12 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
             edges.append(Edge(TARGET, "right", target.right - p.target_right_px, near))
     if front is not None:
         edges.append(Edge(FRONT, "left", front.left - p.front_left_px, near))
-        narrow = front.width < p.narrow_px
-        bias = p.narrow_right_px if narrow else p.front_right_px
-        edges.append(Edge(FRONT, "right", front.right - bias, _far(front, p)))
+        bias, sigma = p.front_right(front, target)
+        edges.append(Edge(FRONT, "right", front.right - bias, sigma))
     if rear is not None:
-        edges.append(Edge(REAR, "left", rear.left - p.rear_left_px, _far(rear, p)))
-        if target is None:
-            edges.append(Edge(REAR, "right", rear.right - p.rear_right_px, _far(rear, p)))
+        # Its right edge isn't sharp: it may take in a sliver of the Target face.
+        bias, sigma = p.rear_left(rear, target)
+        edges.append(Edge(REAR, "left", rear.left - bias, sigma))
     if boxes:
         widest = max(boxes, key=lambda face: boxes[face].width)
         edges += _rows(widest, boxes[widest], p, 1.0 if widest == TARGET else 1.5)
@@ -161,11 +232,6 @@ def sliver(edge: Edge, front_px: float, p: EdgeParameters) -> Edge:
     # Halfway, a little noise decides.
     sigma = edge.sigma_px + p.sliver_px * 2.0 * share * (1.0 - share)
     return replace(edge, position_px=edge.position_px - p.sliver_px * share, sigma_px=sigma)
-
-
-def _far(box: Box, p: EdgeParameters) -> float:
-    middling = p.narrow_px <= box.width < p.wide_px
-    return p.far_column_sigma_px if middling else p.poor_column_sigma_px
 
 
 def _rows(face: int, box: Box, p: EdgeParameters, scale: float) -> Iterable[Edge]:

@@ -15,21 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
-from robot_formation.control.marker_view import (
-    PICTURE_WIDTH_PX,
-    Edge,
-    EdgeParameters,
-    View,
-    hidden,
-    one_marker,
-    sliver,
-    view,
-)
+from robot_formation.control.marker_view import EdgeParameters, View, one_marker, view
 from robot_formation.control.motion import Motion
+from robot_formation.control.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.control.relative_pose import (
     CURVATURE,
+    SADDLE,
     SIZE,
-    TWIST,
+    SKEW,
     YAW,
     MarkerModel,
     Matrix,
@@ -37,17 +30,17 @@ from robot_formation.control.relative_pose import (
     X,
     Y,
     after_motion,
+    leans,
 )
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
-_ITERATIONS = 6
-_STRAY_SIGMAS = 1.5
 _KEPT_COST = 16.0
-_LIKELY_COST = 16.0
-_MISFIT_COST = 30.0
+_LIKELY_COST = 9.0
 _GATE_PX = 15.0
-_HYPOTHESES = 14
+_MOST_SURPRISE = 30.0
+_MISFIT_GAIN = 0.5
+_HYPOTHESES = 50
 FACES = (TARGET, FRONT, REAR)
 
 
@@ -56,14 +49,23 @@ class FilterParameters:
     """How far the filter trusts moves, the ground and what it saw before."""
 
     curvature_sigma_per_m: float = parameter(
-        0.15, "Curvature of the ground between the robots", unit="1/m", low=1e-4, high=10.0
+        0.15, "Mean curvature of the ground between the robots", unit="1/m", low=1e-4, high=10.0
     )
     curvature_drift_per_m: float = parameter(
-        0.005, "Change of that curvature with each step of the neighbour", unit="1/m", low=0.0, high=10.0
+        0.0015,
+        "Change of the curvatures with each step of the neighbour; more where steps surprise",
+        unit="1/m",
+        low=0.0,
+        high=10.0,
     )
-    twist_sigma_rad: float = parameter(
-        0.006, "Relative pitch that the curvature doesn't account for", unit="rad", low=1e-4, high=0.5
+    saddle_sigma_per_m: float = parameter(
+        0.1,
+        "Half of the difference between the ground's curvatures along and across",
+        unit="1/m",
+        low=1e-4,
+        high=10.0,
     )
+    skew_sigma_per_m: float = parameter(0.02, "Mixed part of the ground's curvature", unit="1/m", low=1e-4, high=10.0)
     move_sigma: float = parameter(0.02, "Error of a measured move, share of its length", low=0.0, high=1.0)
     move_floor_m: float = parameter(0.0007, "Error of a measured move, least", unit="m", low=0.0, high=0.1)
     turn_sigma: float = parameter(0.06, "Error of a measured turn, share of it", low=0.0, high=1.0)
@@ -78,7 +80,17 @@ class FilterParameters:
         0.02, "How far the neighbour's step may differ from the last one", unit="m", low=0.0, high=1.0
     )
     neighbour_sidestep_sigma_m: float = parameter(
-        0.0005, "How far the neighbour's step leads aside from its heading", unit="m", low=0.0, high=1.0
+        0.0005,
+        "How far the neighbour's step leads aside from its heading, least; more where steps surprise",
+        unit="m",
+        low=0.0,
+        high=1.0,
+    )
+    calm_misfit: float = parameter(
+        0.12,
+        "Misfit of the first look after a step, mean square by its expected scatter, up to which nothing surprises",
+        low=1e-4,
+        high=100.0,
     )
     slip_per_lean: float = parameter(
         0.76,
@@ -106,23 +118,17 @@ class FilterParameters:
     )
 
 
-@dataclass
-class Hypothesis:
-    """State (5,) and covariance (5, 5) as in `relative_pose`, and twice the negative log likelihood of all looks."""
-
-    state: Vector
-    covariance: Matrix
-    cost: float = 0.0
-
-
 class PoseFilter:
     """Where the neighbour stands, as far as looks and moves tell."""
 
     def __init__(self, model: MarkerModel, edges: EdgeParameters, parameters: FilterParameters) -> None:
         self._model = model
         self._edges = edges
+        self._looks = LookUpdate(model, edges)
         self._p = parameters
         self.hypotheses: list[Hypothesis] = []
+        self._misfit = 0.0
+        self._stepped = False
 
     @property
     def known(self) -> bool:
@@ -171,7 +177,7 @@ class PoseFilter:
         # The turn comes first: its error swings the way that follows.
         yaw = (p.turn_sigma * motion.yaw_rad) ** 2 + p.yaw_drift_rad**2 * length / 0.1
         place = p.move_floor_m**2 + (p.move_sigma * length) ** 2 + (0.02 * motion.yaw_rad) ** 2
-        noise = np.diag([place, place, yaw, 0.0, 0.0])
+        noise = np.diag([place, place, yaw, 0.0, 0.0, 0.0])
         for hypothesis in self.hypotheses:
             self._propagate(hypothesis, motion, noise)
 
@@ -181,6 +187,7 @@ class PoseFilter:
         c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
         turn = np.array([[c, s], [-s, c]])
         jacobian[:2, :2] = turn
+        jacobian[SADDLE:, SADDLE:] = turn.T @ turn.T  # by twice the angle, the other way
         moved = after_motion(state, motion)
         # A turn that was not measured moves the neighbour about the follower.
         swing = np.eye(SIZE)
@@ -199,42 +206,46 @@ class PoseFilter:
         p = self._p
         overshoot = max(0.0, overshoot)
         slip = p.slip_per_lean + p.slip_growth * overshoot**2
-        sidestep = p.neighbour_sidestep_sigma_m if sidestep_sigma_m is None else sidestep_sigma_m
+        # What the ground does to a step is a model of the default world; where it fails, it counts for less.
+        surprise = min(_MOST_SURPRISE, max(1.0, self._misfit / p.calm_misfit))
+        sidestep = p.neighbour_sidestep_sigma_m * surprise if sidestep_sigma_m is None else sidestep_sigma_m
+        self._stepped = True
         for hypothesis in self.hypotheses:
             state, covariance = hypothesis.state, hypothesis.covariance
             c, s = math.cos(state[YAW]), math.sin(state[YAW])
             along = np.array([[c, -s], [s, c]])
             # The neighbour slips as the follower does, and by as much more as it leans more.
-            aside = step.y_m - slip * state[CURVATURE] * state[Y] * abs(step.x_m)
+            lean = float(leans(state[None])[0][0])
+            aside = step.y_m - slip * lean * abs(step.x_m)
             jacobian = np.eye(SIZE)
             jacobian[:2, YAW] = along @ (-aside, step.x_m)
             hypothesis.state = state.copy()
             hypothesis.state[:2] += along @ (step.x_m, aside)
-            lean = state[CURVATURE] * state[Y]
             hypothesis.state[YAW] += p.turn_growth * overshoot**2 * lean * abs(step.x_m)
             noise = np.zeros((SIZE, SIZE))
             noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, sidestep**2]) @ along.T
             noise[YAW, YAW] = p.neighbour_turn_sigma_rad**2
-            noise[CURVATURE, CURVATURE] = p.curvature_drift_per_m**2
-            noise[TWIST, TWIST] = (0.2 * p.twist_sigma_rad) ** 2
+            for part in (CURVATURE, SADDLE, SKEW):
+                noise[part, part] = (p.curvature_drift_per_m * surprise) ** 2
             hypothesis.covariance = jacobian @ covariance @ jacobian.T + noise
 
     # --- looks ------------------------------------------------------------------------------------------------------
 
-    def look(self, boxes: dict[int, Box], *, doubt: bool = False) -> None:
-        """Take a look's boxes, at least one; with `doubt`, an estimate that they contradict is made anew from them."""
-        seen = view(boxes, self._edges)
-        before = self._least() if self.hypotheses else 0.0
+    def look(self, boxes: dict[int, Box]) -> None:
+        """Take a look's boxes, at least one."""
+        if self._stepped and self.hypotheses:
+            self._misfit += _MISFIT_GAIN * (self.surprise(boxes) - self._misfit)
+        self._stepped = False
         if not self.hypotheses:
-            self._begin(boxes)
-        self._take(seen)
-        if not self.hypotheses or (doubt and self._least() - before > _MISFIT_COST):
-            self._begin(boxes)
-            self._take(seen)
+            self.hypotheses = self._guesses(boxes)
+        self._take(view(boxes, self._edges))
+        if not self.hypotheses:
+            self.hypotheses = self._guesses(boxes)
+            self._take(view(boxes, self._edges))
 
     def _take(self, seen: View) -> None:
         for hypothesis in self.hypotheses:
-            self._update(hypothesis, seen)
+            self._looks.update(hypothesis, seen)
         self._prune()
 
     def plausible(self, blocks: Sequence[Block]) -> list[Block]:
@@ -258,106 +269,38 @@ class PoseFilter:
 
     def surprise(self, boxes: dict[int, Box]) -> float:
         """Tell how badly a look fits: squared innovation by its expected scatter, per edge."""
-        seen = view(boxes, self._edges)
-        if not seen.edges:
-            return 0.0
-        costs = []
-        for hypothesis in self.hypotheses:
-            h, predicted = self._linearise(hypothesis.state, seen.edges)
-            innovation = np.array([edge.position_px for edge in seen.edges]) - predicted
-            scatter = h @ hypothesis.covariance @ h.T + np.diag([4.0 * edge.sigma_px**2 for edge in seen.edges])
-            costs.append(float(innovation @ np.linalg.solve(scatter, innovation)) / len(seen.edges))
-        return min(costs)
+        return self._looks.surprise(self.hypotheses, view(boxes, self._edges))
 
-    def _begin(self, boxes: dict[int, Box]) -> None:
+    def whole(self, boxes: dict[int, Box]) -> bool:
+        """Whether a look's boxes, at least one, fit together for some pose: not those of a partly covered marker."""
+        seen = view(boxes, self._edges)
+        guesses = sorted(self._guesses(boxes), key=lambda guess: abs(guess.state[YAW]))  # the likeliest first
+        return any(self._looks.fits(guess, seen) for guess in guesses)
+
+    def _guesses(self, boxes: dict[int, Box]) -> list[Hypothesis]:
         face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
         box = boxes[face]
-        self.hypotheses = []
-        for degrees in range(-90, 91, 10):
+        guesses = []
+        for degrees in range(-92, 93, 4):
             guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
-            ground = [self._p.curvature_sigma_per_m**2, self._p.twist_sigma_rad**2]
-            covariance = np.diag([0.1**2, 0.1**2, math.radians(12.0) ** 2, *ground])
-            self.hypotheses.append(Hypothesis(guess, covariance))
-
-    def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:
-        steps = np.diag([1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
-        found = self._model.edges(np.concatenate([state[None], state + steps, state - steps]), edges)
-        return ((found[1 : SIZE + 1] - found[SIZE + 1 :]) / 2e-4).T, found[0]
-
-    def _update(self, hypothesis: Hypothesis, seen: View) -> None:
-        """Iterated extended Kalman update; the cost is that of the posterior's residuals and of the way to it."""
-        edges = [*self._trusted(hypothesis.state, seen), *self._exceeded(hypothesis.state, seen)]
-        if not edges:
-            return
-        measured = np.array([edge.position_px for edge in edges])
-        sigmas = np.array([edge.sigma_px for edge in edges])
-        noise = np.diag(sigmas**2)
-        prior, covariance = hypothesis.state, hypothesis.covariance
-        state = prior
-        for number in range(_ITERATIONS):
-            h, predicted = self._linearise(state, edges)
-            # Huber's weights: an edge that contradicts the others, as of a broken block, pulls with limited force.
-            strays = np.maximum(1.0, np.abs(measured - predicted) / (_STRAY_SIGMAS * sigmas)) if number else 1.0
-            noise = np.diag(sigmas**2 * strays)
-            scatter = h @ covariance @ h.T + noise
-            gain = np.linalg.solve(scatter, h @ covariance).T
-            change = prior + gain @ (measured - predicted - h @ (prior - state)) - state
-            change[YAW] = max(-0.3, min(0.3, change[YAW]))
-            state = state + change
-            if float(np.abs(change).max()) < 1e-5:
-                break
-        h, predicted = self._linearise(state, edges)
-        kept = np.eye(SIZE) - gain @ h
-        hypothesis.covariance = kept @ covariance @ kept.T + gain @ noise @ gain.T
-        hypothesis.state = state
-        residual, way = measured - predicted, state - prior
-        hypothesis.cost += float(residual @ (residual / np.diag(noise)) + way @ np.linalg.solve(covariance, way))
-        hypothesis.cost += float(np.linalg.slogdet(scatter)[1])
-        hypothesis.cost += self._contradiction(state, seen)
-
-    def _trusted(self, state: Vector, seen: View) -> list[Edge]:
-        """List the edges; a Front face that is not reported may shift the Target block's right one."""
-        if FRONT in seen.faces or (front_px := self._model.widths(state)[FRONT]) <= 0.0:
-            return list(seen.edges)
-        return [
-            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (TARGET, "right") else edge
-            for edge in seen.edges
-        ]
-
-    def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
-        """List the bounds on faces that were not reported which a state breaks."""
-        widths, columns = self._model.widths(state), self._model.pixels(state[None])[0, :, 0]
-        if columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX:
-            return []  # it may be beyond the picture's edge
-        return [edge for edge in hidden(seen, self._edges) if widths[edge.face] > edge.position_px]
-
-    def _contradiction(self, state: Vector, seen: View) -> float:
-        """Charge faces that were reported and should not have been, or the other way round."""
-        widths = self._model.widths(state)
-        cost = sum(max(0.0, 1.0 - widths[face]) ** 2 / 4.0 for face in seen.faces)
-        for edge in self._exceeded(state, seen):
-            cost += ((widths[edge.face] - edge.position_px) / edge.sigma_px) ** 2
-        return cost
+            ground = [self._p.curvature_sigma_per_m**2, self._p.saddle_sigma_per_m**2, self._p.skew_sigma_per_m**2]
+            covariance = np.diag([0.1**2, 0.1**2, math.radians(3.0) ** 2, *ground])
+            guesses.append(Hypothesis(guess, covariance))
+        return guesses
 
     def _prune(self) -> None:
         """Keep the likely hypotheses, one of each kind, the best first."""
         kept: list[Hypothesis] = []
-        self.hypotheses = [h for h in self.hypotheses if math.isfinite(h.cost) and _sane(h)]
+        self.hypotheses = [h for h in self.hypotheses if h.sane]
         for hypothesis in sorted(self.hypotheses, key=lambda h: h.cost):
             if hypothesis.cost > self._least() + _KEPT_COST:
                 continue
-            if all(abs(hypothesis.state[YAW] - other.state[YAW]) > math.radians(3.0) for other in kept):
+            if all(abs(hypothesis.state[YAW] - other.state[YAW]) > math.radians(1.5) for other in kept):
                 kept.append(hypothesis)
         self.hypotheses = kept[:_HYPOTHESES]
 
     def _least(self) -> float:
         return min(h.cost for h in self.hypotheses)
-
-
-def _sane(hypothesis: Hypothesis) -> bool:
-    """Whether a hypothesis is about a neighbour that could be in view."""
-    state = hypothesis.state
-    return bool(np.isfinite(state).all()) and math.hypot(state[X], state[Y]) < 2.0 and abs(state[YAW]) < 2.0
 
 
 def _gain_update(hypothesis: Hypothesis, h: Matrix, innovation: Vector, variance: Vector) -> float:

@@ -22,10 +22,10 @@ from robot_formation.parameters import parameter
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-X, Y, YAW, CURVATURE, TWIST = range(5)
+X, Y, YAW, CURVATURE, SADDLE, SKEW = range(6)
 """State of the neighbour in the follower's level frame: x, y [m], yaw [rad]; the ground's curvature [1/m], by which the
-robots lean towards each other, and the relative pitch that it doesn't account for [rad]."""
-SIZE = 5
+robots lean towards each other: its mean, half of what it is more along y than along x, and its mixed part."""
+SIZE = 6
 
 _CORNERS = {
     (TARGET, "left"): [0, 1],
@@ -75,13 +75,12 @@ class MarkerModel:
         self._lens = np.array([0.0, p.lens_y_m, p.lens_z_m])
 
     def pixels(self, states: Matrix) -> Matrix:
-        """Project the cube's corners for states (n, 5); returns columns and rows, (n, 8, 2) px."""
+        """Project the cube's corners for states (n, 6); returns columns and rows, (n, 8, 2) px."""
         p = self.parameters
         cosine, sine = np.cos(states[:, YAW])[:, None], np.sin(states[:, YAW])[:, None]
         cx, cy, cz = self._corners.T
         points = np.stack([cosine * cx - sine * cy, sine * cx + cosine * cy, np.broadcast_to(cz, (len(states), 8))], -1)
-        roll = states[:, CURVATURE] * states[:, Y]
-        pitch = states[:, TWIST] - states[:, CURVATURE] * states[:, X]
+        roll, pitch = leans(states)
         half = _tilts(0.5 * roll, 0.5 * pitch)
         points = np.einsum("nij,nkj->nki", half, points)
         points[:, :, :2] += states[:, None, :2]
@@ -90,7 +89,7 @@ class MarkerModel:
         return np.stack([p.centre_x_px + points[:, :, 0] * scale, p.centre_y_px - points[:, :, 2] * scale], -1)
 
     def edges(self, states: Matrix, edges: Sequence[Edge]) -> Matrix:
-        """Predict edges for states (n, 5), (n, edges) px."""
+        """Predict edges for states (n, 6), (n, edges) px."""
         pixels = self.pixels(states)
         found = np.empty((len(states), len(edges)))
         for number, edge in enumerate(edges):
@@ -116,7 +115,11 @@ class MarkerModel:
 
     def widths(self, state: Vector) -> dict[int, float]:
         """Tell how wide each face appears, px; negative if it is turned away."""
-        columns = self.pixels(state[None])[0, :, 0]
+        return self.shown(state, (-math.inf, math.inf))
+
+    def shown(self, state: Vector, limits_px: tuple[float, float]) -> dict[int, float]:
+        """Tell how much of each face's width lies between two columns, px; negative if it is turned away."""
+        columns = np.clip(self.pixels(state[None])[0, :, 0], *limits_px)
         middle = {edge: float(columns[corners].mean()) for edge, corners in _CORNERS.items()}
         return {face: middle[face, "right"] - middle[face, "left"] for face in (TARGET, FRONT, REAR)}
 
@@ -129,7 +132,17 @@ class MarkerModel:
         cosine, sine = math.cos(yaw), math.sin(yaw)
         x = (column_px - p.centre_x_px) / p.focal_length_px * depth - (cosine * out[0] - sine * out[1])
         y = depth + p.lens_y_m - (sine * out[0] + cosine * out[1])
-        return np.array([x, y, yaw, 0.0, 0.0])
+        return np.array([x, y, yaw, 0.0, 0.0, 0.0])
+
+
+def leans(states: Matrix) -> tuple[Vector, Vector]:
+    """Tell the neighbour's roll and pitch against the follower [rad], each (n,), for states (n, 6).
+
+    On a surface z = p^T S p / 2 about the follower, with S symmetric, the slopes at p are S p.
+    """
+    mean, more, mixed = (states[:, index] for index in (CURVATURE, SADDLE, SKEW))
+    x, y = states[:, X], states[:, Y]
+    return (mean + more) * y + mixed * x, -((mean - more) * x + mixed * y)
 
 
 def _tilts(roll: Vector, pitch: Vector) -> Matrix:
@@ -145,7 +158,10 @@ def after_motion(state: Vector, motion: Motion) -> Vector:
     """Tell the state after the follower's motion."""
     c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
     dx, dy = state[X] - motion.x_m, state[Y] - motion.y_m
-    return np.array([c * dx + s * dy, c * dy - s * dx, state[YAW] - motion.yaw_rad, state[CURVATURE], state[TWIST]])
+    c2, s2 = math.cos(2.0 * motion.yaw_rad), math.sin(2.0 * motion.yaw_rad)
+    more, mixed = state[SADDLE], state[SKEW]
+    ground = [state[CURVATURE], c2 * more - s2 * mixed, c2 * mixed + s2 * more]
+    return np.array([c * dx + s * dy, c * dy - s * dx, state[YAW] - motion.yaw_rad, *ground])
 
 
 def way_to_formation(state: Vector) -> Motion:

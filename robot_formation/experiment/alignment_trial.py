@@ -49,6 +49,14 @@ class Start:
 
 
 @dataclass(frozen=True)
+class SeenFrame:
+    """The detector's blocks of one frame, and when its picture was taken [ns]."""
+
+    blocks: Sequence[Block]
+    stamp_ns: int
+
+
+@dataclass(frozen=True)
 class Equipment:
     """What all trials have in common."""
 
@@ -96,7 +104,7 @@ class AlignmentTrial:
         equipment: world, drive, detector and fine-tuner.
         start: where the follower begins.
         seed: of every random stream.
-        tamper: stands between detector and fine-tuner: takes blocks and stamp [ns], drops a frame by returning None.
+        tamper: stands between detector and fine-tuner: takes a frame, returns the frames that arrive now.
         spoil: stands between camera and detector: takes a picture and the number of the frame, returns a picture.
     """
 
@@ -105,7 +113,7 @@ class AlignmentTrial:
         equipment: Equipment,
         start: Start,
         seed: int,
-        tamper: Callable[[Sequence[Block], int], Sequence[Block] | None] | None = None,
+        tamper: Callable[[SeenFrame], Sequence[SeenFrame]] | None = None,
         spoil: Callable[[Picture, int], Picture] | None = None,
     ) -> None:
         self._world = World(equipment.surface, poses(equipment.surface, start), equipment.world, seed=seed)
@@ -181,11 +189,9 @@ class AlignmentTrial:
                     continue
                 picture = event.image if self._spoil is None else self._spoil(event.image, self._frames)
                 self._frames += 1
-                blocks: Sequence[Block] | None = self._detector.process(picture, event.stamp_ns // 1000)
-                if self._tamper is not None:
-                    blocks = self._tamper(blocks or [], event.stamp_ns)
-                if blocks is not None:
-                    self._actions.extend(self._tuner.frame(blocks, event.stamp_ns))
+                seen = SeenFrame(self._detector.process(picture, event.stamp_ns // 1000), event.stamp_ns)
+                for frame in [seen] if self._tamper is None else self._tamper(seen):
+                    self._actions.extend(self._tuner.frame(frame.blocks, frame.stamp_ns))
 
     def _watch(self) -> None:
         """Note a touch: the bodies overlap, or the standing leader has been pushed."""
