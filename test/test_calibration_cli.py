@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from cli_tools import complaint
 from graph_tools import formation, json_of
 from mcap.reader import make_reader
 
@@ -23,18 +24,6 @@ def call(capsys, *arguments):
     captured = capsys.readouterr()
     assert "Traceback" not in captured.err
     return code, captured
-
-
-def complaint(capsys, *arguments):
-    try:
-        code = main([str(argument) for argument in arguments])
-    except SystemExit as leave:  # argparse ends so
-        code = leave.code
-    captured = capsys.readouterr()
-    assert code == 2
-    assert captured.out == ""
-    assert "Traceback" not in captured.err
-    return captured.err.strip().splitlines()[-1]
 
 
 @pytest.fixture(scope="module")

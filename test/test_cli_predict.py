@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 
+import cli_tools
 import matplotlib.image
 import numpy as np
 import pytest
@@ -61,17 +62,7 @@ def forecasts(capsys, *arguments):
 
 
 def complaint(capsys, *arguments):
-    """Call the verb, which must fail on its arguments; return the last line that it prints."""
-    try:
-        code = main(["predict", *map(str, arguments)])
-    except SystemExit as leave:  # argparse ends so
-        code = leave.code
-    said = capsys.readouterr()
-    assert code == 2
-    assert said.out == ""
-    lines = said.err.strip().splitlines()
-    assert len(lines) == 1 or lines[0].startswith("usage:")
-    return lines[-1]
+    return cli_tools.complaint(capsys, "predict", *arguments)
 
 
 def test_json_holds_forecast_covariance_and_errors_of_each_predictor_and_nothing_else(capsys, log, tmp_path):

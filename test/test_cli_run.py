@@ -4,26 +4,13 @@ import json
 import sys
 
 import pytest
+from cli_tools import complaint
 from graph_tools import formation, json_of
 
 from robot_formation.bag.reader import read_bag
 from robot_formation.cli.main import main
 
 FAST = ("--camera", "on_demand", "--in-process")
-
-
-def complaint(capsys, *arguments):
-    """Call a verb that must fail on its arguments; return the one line that it prints."""
-    try:
-        code = main([str(argument) for argument in arguments])
-    except SystemExit as leave:  # argparse ends so
-        code = leave.code
-    captured = capsys.readouterr()
-    assert code == 2
-    assert captured.out == ""
-    lines = captured.err.strip().splitlines()
-    assert "Traceback" not in captured.err
-    return lines[-1]
 
 
 @pytest.mark.parametrize(

@@ -9,19 +9,18 @@ import sys
 
 import numpy as np
 import pytest
+from graph_lab import DEADLINE_S, Lab, open_lab, values_of
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String, UInt32
 from std_srvs.srv import SetBool, Trigger
 from synthetic_bag import STORE, text
 from test_bag_death import limit_file_size, ticks_in_finished_chunks, ticks_of
-from test_graph_nodes import DEADLINE_S, Lab, values_of
 
 from robot_formation import conversions, names
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import recover
 from robot_formation.bag.writer import BagWriter
-from robot_formation.experiment.domain import DomainReservation
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
 
@@ -63,12 +62,9 @@ class BagLab(Lab):
 
 
 @pytest.fixture
-def lab(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    with DomainReservation() as domain:
-        made = BagLab(domain, tmp_path)
+def lab(tmp_path):
+    with open_lab(tmp_path, BagLab) as made:
         yield made
-        made.close()
 
 
 def payloads(bag):

@@ -3,26 +3,16 @@
 import array
 
 import pytest
+from graph_lab import values_of
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
-from test_graph_nodes import Lab, values_of
 from vision_helpers import GROUPS, RED, canvas
 
 from robot_formation import conversions, names
-from robot_formation.experiment.domain import DomainReservation
 from robot_formation.vision.signatures import save_signatures
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
 SQUARE = canvas(((134, 60, 48, 48), RED))
-
-
-@pytest.fixture
-def lab(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    with DomainReservation() as domain:
-        made = Lab(domain, tmp_path)
-        yield made
-        made.close()
 
 
 def image(number, **values):

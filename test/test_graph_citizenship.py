@@ -6,17 +6,16 @@ import signal
 import pytest
 import rclpy
 import yaml
+from graph_lab import Lab, open_lab
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSDurabilityPolicy, QoSReliabilityPolicy
 from synthetic_bag import SyntheticRun
-from test_graph_nodes import Lab
 
 from robot_formation import names
 from robot_formation.bag.writer import BagWriter
 from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.domain import DomainReservation
 from robot_formation.experiment.in_process import absolute
 from robot_formation.parameters import from_mapping
 
@@ -137,14 +136,9 @@ def dump(node, parameters):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch, DomainReservation() as domain:
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        made = Site(domain, tmp_path_factory.mktemp("site"))
-        try:
-            made.start_all(lambda node: options_of(node, made.folder))
-            yield made
-        finally:
-            made.close()
+    with open_lab(tmp_path_factory.mktemp("site"), Site) as made:
+        made.start_all(lambda node: options_of(node, made.folder))
+        yield made
 
 
 def component(kind):

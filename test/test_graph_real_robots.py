@@ -8,11 +8,9 @@ from pathlib import Path
 
 import pytest
 from rclpy.node import Node
-from test_graph_nodes import Lab
 
 from robot_formation import conversions, names
 from robot_formation.control.drive import JOINTS, DriveParameters
-from robot_formation.experiment.domain import DomainReservation
 from robot_formation.nodes.host import qos_profile
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
@@ -67,15 +65,6 @@ class Bridge:
         values = list(self.positions.values())
         message = conversions.joint_states(JOINTS, values, [speed] * len(JOINTS), time.time_ns(), number)
         self._publisher.publish(message)
-
-
-@pytest.fixture
-def lab(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    with DomainReservation() as domain:
-        made = Lab(domain, tmp_path)
-        yield made
-        made.close()
 
 
 def start_camera(lab, folder):

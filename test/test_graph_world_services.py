@@ -5,24 +5,13 @@ from graph_tools import launch, short_scenario
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
-from test_graph_nodes import Lab
 
 from robot_formation import conversions, names
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.quantities import analyse
 from robot_formation.control.drive import WheelCommand
-from robot_formation.experiment.domain import DomainReservation
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
-
-
-@pytest.fixture
-def lab(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    with DomainReservation() as domain:
-        made = Lab(domain, tmp_path)
-        yield made
-        made.close()
 
 
 class Stranger:

@@ -8,10 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_graph_nodes import Lab
 
 from robot_formation.analysis.from_bag import load_run
-from robot_formation.experiment.domain import DomainReservation
 from robot_formation.experiment.scenario import load_track
 from robot_formation.launching.processes import processes
 
@@ -30,15 +28,6 @@ needs_ros2 = pytest.mark.skipif(not is_installed(), reason="needs ros2 launch an
 needs_launch_testing = pytest.mark.skipif(
     not is_installed() or importlib.util.find_spec("launch_testing") is None, reason="needs launch_testing"
 )
-
-
-@pytest.fixture
-def lab(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    with DomainReservation() as domain:
-        made = Lab(domain, tmp_path)
-        yield made
-        made.close()
 
 
 def start(lab, *arguments):

@@ -8,12 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from graph_lab import open_lab
 from synthetic_bag import SyntheticRun
-from test_graph_nodes import Lab
 
 from robot_formation.bag.writer import BagWriter
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.domain import DomainReservation
 
 # On one core when the suite is spread: one build serves all.
 pytestmark = pytest.mark.xdist_group("colcon")
@@ -125,26 +124,21 @@ def test_ros2_run_finds_every_node_which_takes_ros_arguments_and_ends_on_ctrl_c(
         "recorder": ["-p", f"path:={tmp_path / 'bag'}"],
         "player": ["-p", f"bag:={tmp_path / 'first'}", "-p", "wait_s:=600.0"],
     }
-    with DomainReservation() as domain, pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        with BagWriter(tmp_path / "first") as writer:
-            SyntheticRun(writer)
-        lab = Lab(domain, tmp_path)
-        try:
-            environment = {**lab.environment, **sourced, "ROS_DOMAIN_ID": str(domain)}
-            started = {}
-            for node in NODES:
-                namespace = "/follower_1" if node in KINDS and KINDS[node].robots else "/"
-                config = installed / "share" / "robot_formation" / "config" / f"{node}.yaml"
-                command = [str(ros2_run(sourced, "robot_formation", node)), "--ros-args", "-r", f"__ns:={namespace}"]
-                command += ["--params-file", str(config), *needed.get(node, [])]
-                started[node, namespace] = lab.open(command, environment, cwd=tmp_path)
-            lab.until(lambda: set(started) <= set(lab.node.get_node_names_and_namespaces()))
-            for process in started.values():
-                os.killpg(process.pid, signal.SIGINT)
-            errors = {node: process.communicate(timeout=60)[1] for (node, _), process in started.items()}
-            codes = {node: process.returncode for (node, _), process in started.items()}
-        finally:
-            lab.close()
+    with BagWriter(tmp_path / "first") as writer:
+        SyntheticRun(writer)
+    with open_lab(tmp_path) as lab:
+        environment = {**lab.environment, **sourced, "ROS_DOMAIN_ID": str(lab.domain)}
+        started = {}
+        for node in NODES:
+            namespace = "/follower_1" if node in KINDS and KINDS[node].robots else "/"
+            config = installed / "share" / "robot_formation" / "config" / f"{node}.yaml"
+            command = [str(ros2_run(sourced, "robot_formation", node)), "--ros-args", "-r", f"__ns:={namespace}"]
+            command += ["--params-file", str(config), *needed.get(node, [])]
+            started[node, namespace] = lab.open(command, environment, cwd=tmp_path)
+        lab.until(lambda: set(started) <= set(lab.node.get_node_names_and_namespaces()))
+        for process in started.values():
+            os.killpg(process.pid, signal.SIGINT)
+        errors = {node: process.communicate(timeout=60)[1] for (node, _), process in started.items()}
+        codes = {node: process.returncode for (node, _), process in started.items()}
     assert codes == dict.fromkeys(NODES, 0), errors
     assert [node for node, text in errors.items() if "Traceback" in text] == []

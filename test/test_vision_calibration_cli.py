@@ -9,6 +9,7 @@ from concurrent.futures import BrokenExecutor
 
 import numpy as np
 import pytest
+from cli_tools import complaint
 
 from robot_formation import conversions
 from robot_formation.bag.reader import read_bag
@@ -36,17 +37,6 @@ def call(capsys, *arguments):
     captured = capsys.readouterr()
     assert "Traceback" not in captured.err
     return code, captured
-
-
-def complaint(capsys, *arguments):
-    try:
-        code = main([str(argument) for argument in arguments])
-    except SystemExit as leave:  # argparse ends so
-        code = leave.code
-    captured = capsys.readouterr()
-    assert (code, captured.out) == (2, "")
-    assert "Traceback" not in captured.err
-    return captured.err.strip().splitlines()[-1]
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_formation.control.calibration import CalibrationError, differences
 from robot_formation.control.vision_calibration import load_vision
+from robot_formation.experiment.drive_curves import origin
 
 if TYPE_CHECKING:
     from robot_formation.experiment.scenario import Scenario
@@ -40,9 +41,7 @@ def describe_camera(scenario: Scenario) -> str:
     path = scenario.parameters("fine_tuner")["calibration_file"]
     if not path:
         return ""
-    measured = load_vision(path).measured_with
-    said = [f"{name} {measured[name]}" for name in ("seed", "surface") if name in measured]
-    return f"camera calibration: {path}{', measured with ' if said else ''}{', '.join(said)}"
+    return f"camera calibration: {origin(path, load_vision(path).measured_with)}"
 
 
 def check_camera(scenario: Scenario) -> None:

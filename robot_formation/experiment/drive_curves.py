@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from robot_formation.control.calibration import CalibrationError, Curve, calibrated, load_calibration
@@ -62,6 +63,10 @@ def describe_curves(scenario: Scenario) -> str:
     path = scenario.parameters("drive")["calibration_file"]
     if not path:
         return "drive curves: one for all robots, by the parameters drive.calibration.*"
-    measured = load_calibration(path).measured_with
-    said = [f"{name} {measured[name]}" for name in ("seed", "surface") if name in measured]
-    return f"drive curves: {path}{', measured with ' if said else ''}{', '.join(said)}"
+    return f"drive curves: {origin(path, load_calibration(path).measured_with)}"
+
+
+def origin(path: str, measured_with: Mapping[str, Any]) -> str:
+    """Name a calibration file and what it was measured with, as far as it says."""
+    said = [f"{name} {measured_with[name]}" for name in ("seed", "surface") if name in measured_with]
+    return f"{path}{', measured with ' if said else ''}{', '.join(said)}"
