@@ -46,7 +46,7 @@ setup(
         "PyYAML>=6.0.1",
         "joblib>=1.3.2",
         "matplotlib>=3.6.3",
-        "mcap>=1.2.1",
+        "mcap>=1.5.0",
         "numpy>=1.26.4",
         "opencv-python-headless>=4.6.0.66",
         "pybullet>=3.2.6",
