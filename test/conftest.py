@@ -3,15 +3,8 @@
 `pytest --hypothesis-profile=default` looks for new cases instead.
 """
 
-import os
-
 import pytest
 from hypothesis import settings
-
-# Warnings are errors in the processes that tests start, too, and files left open are warned of. The development mode's
-# checks of memory are left out: they are about C code, and slow.
-for name, value in {"PYTHONDEVMODE": "1", "PYTHONMALLOC": "default", "PYTHONWARNINGS": "error"}.items():
-    os.environ.setdefault(name, value)
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
