@@ -50,7 +50,7 @@ setup(
         "numpy>=1.26.4",
         "opencv-python-headless>=4.6.0.66",
         "pybullet>=3.2.6",
-        "rosbags>=0.11.2",
+        "rosbags>=0.11.6",
         "zstandard>=0.22.0",
     ],
     extras_require={
