@@ -7,6 +7,7 @@ import time
 
 import pytest
 import rclpy
+from graph_tools import STRICT
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -50,7 +51,7 @@ class Lab:
 
     def start(self, name, *arguments, namespace="/"):
         command = [sys.executable, "-m", f"robot_formation.nodes.{name}", "--ros-args", "-r", f"__ns:={namespace}"]
-        return self.open([*command, *arguments], self.environment)
+        return self.open([*command, *arguments], {**self.environment, **STRICT})
 
     def open(self, command, environment, cwd=None):
         """Start a process in a session of its own, as a terminal would."""

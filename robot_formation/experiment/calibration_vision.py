@@ -59,14 +59,14 @@ _RELEVANT = {
 
 
 def carry_out(positions: Iterable[Position], conditions: Conditions, jobs: int) -> Iterator[list[Sighting]]:
-    """Look at all positions, on several cores by joblib; yields each position's sightings as they come.
+    """Look at all positions, on several cores by joblib; yields each position's sightings, in order.
 
     Raises:
         CalibrationError: if a worker process dies.
     """
     from joblib import Parallel, delayed
 
-    pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="3*n_jobs")
+    pool = Parallel(n_jobs=jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
     try:
         yield from pool(delayed(measure)(position, conditions) for position in positions)
     except BrokenExecutor:

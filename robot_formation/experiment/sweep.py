@@ -247,7 +247,7 @@ def chosen(plan: Plan, rows: Mapping[Task, Row]) -> list[Row]:
 
 
 def carry_out(tasks: Iterable[Task], settings: Sequence[str], jobs: int) -> Iterator[Row]:
-    """Run tasks on this machine's cores by joblib; yield rows as they come.
+    """Run tasks on this machine's cores by joblib; yield rows in the order of the tasks, each as soon as it is there.
 
     Raises:
         SweepError: if a run can't come to its end, or a worker process dies.
@@ -255,7 +255,7 @@ def carry_out(tasks: Iterable[Task], settings: Sequence[str], jobs: int) -> Iter
     from joblib import Parallel, delayed
 
     # One run in a worker at a time; a few wait, so that no worker idles.
-    pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="3*n_jobs")
+    pool = Parallel(n_jobs=jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
     try:
         yield from pool(delayed(run_task)(task, settings) for task in tasks)
     except BrokenExecutor:
