@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.overhead_view import OverheadView
+from robot_formation.components.trail import Trail
 from robot_formation.errors import FormationError
 from robot_formation.parameters import ParameterError, parameter
 from robot_formation.surface import Surface, surface_from_texts
@@ -97,7 +98,7 @@ class WorldComponent(Component):
         self._parameters = parameters
         self._moving: set[str] = set()
         self._numbers = dict.fromkeys(parameters.robots, "")  # of each robot's last command, echoed to its drive
-        self._paths: dict[str, list[Any]] = {name: [] for name in parameters.robots}
+        self._trails: dict[str, Trail[Any]] = {name: Trail() for name in parameters.robots}
         self._overhead = OverheadView(surface, parameters, parameters.seed)
         self.stamp_ns = start_ns
 
@@ -276,10 +277,11 @@ class WorldComponent(Component):
         self._send(self._odom[robot], odometry)
         if event.final:
             pose = conversions.pose_of(odometry)
-            self._paths[robot].append(pose)
             self._send(names.ground_truth_pose(robot), pose)
-            path = conversions.path(self._paths[robot], names.WORLD_FRAME, event.stamp_ns)
-            self._send(names.ground_truth_path(robot), path)
+            path = self._trails[robot].add(state.pose.position, pose)
+            if path is not None:
+                message = conversions.path(path, names.WORLD_FRAME, event.stamp_ns)
+                self._send(names.ground_truth_path(robot), message)
 
 
 def surface_mesh(surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:

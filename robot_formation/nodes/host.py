@@ -25,6 +25,7 @@ from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
+from robot_formation.loopback import use_loopback
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.outbox import Outbox
 from robot_formation.nodes.parameters import AT_START, HostParameters, ParameterNode, declare, take_changes
@@ -68,6 +69,7 @@ def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
     """
     node, running = None, False
     try:
+        use_loopback(os.environ)
         # ROS's own handlers would invalidate the context at once, and lose what is still to be sent.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = ParameterNode(name)
