@@ -10,7 +10,7 @@ from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.trail import Trail
 from robot_formation.parameters import ParameterError, parameter
-from robot_formation.surface import Surface, surface_from_texts
+from robot_formation.surface import SURFACES, Surface, surface_from_texts
 from robot_formation.vision.overhead_tracking import OverheadTracker, OverheadTrackingParameters
 
 
@@ -25,7 +25,9 @@ class OverheadTrackerNodeParameters(OverheadTrackingParameters):
     start_y_m: tuple[float, ...] = parameter(
         (0.16, 0.16), "Start of each robot's base_link in the world", unit="m", low=-10.0, high=100.0
     )
-    surface: str = parameter("bowl", "Name of the surface that a calibration with knows_surface means")
+    surface: str = parameter(
+        "bowl", "Name of the surface that a calibration with knows_surface means", choices=tuple(SURFACES)
+    )
     surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
 
     def __post_init__(self) -> None:

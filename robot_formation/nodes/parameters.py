@@ -141,6 +141,11 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
     return objects
 
 
+def ros_type(spec: Spec) -> str:
+    """Name a parameter's type as ROS does: double, string[] and so on."""
+    return _TYPES[spec.type].name.lower().replace("_array", "[]")
+
+
 def reasons(names: Iterable[str], fixed: Mapping[str, str]) -> dict[str, str]:
     """Tell which of the parameters can't be set while a node runs, and why, by the first pattern that fits."""
     found = {name: next((why for pattern, why in fixed.items() if fnmatchcase(name, pattern)), "") for name in names}

@@ -98,7 +98,7 @@ class RecorderParameters:
         """
         for text in self.metadata:
             if "=" not in text:
-                raise ParameterError(f"recorder: 'metadata' takes texts like key=value, not '{text}'")
+                raise ParameterError(f"'metadata' takes texts like key=value, not '{text}'")
         return dict(text.split("=", 1) for text in self.metadata)
 
 
@@ -293,6 +293,7 @@ class Executable:
 
     def run(self) -> int:
         """Record; return the exit code."""
+        self._node.get_logger().info("ready, recording what is published")
         report = self._recorder.run()
         for topic in report.unseen:
             self._node.get_logger().warning(f"nobody has published {topic}")
