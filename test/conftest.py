@@ -14,7 +14,7 @@ from robot_formation.paths import config_dir
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
-# A middleware reads its profiles once in a process, when a test first joins a graph: as the nodes do, on this machine only.
+# A middleware reads its profiles once in a process, when a test first joins a graph.
 for variable in PROFILES:
     os.environ.setdefault(variable, str(config_dir() / "loopback.xml"))
 

@@ -1,5 +1,6 @@
 """Paths for viewers: the whole drive in a bounded number of poses, and few enough messages."""
 
+import itertools
 import math
 
 import pytest
@@ -41,7 +42,7 @@ def test_the_whole_drive_stays_visible(steps):
     assert all(len(path) <= MOST_POSES for path in sent)
     last = sent[-1]
     assert last[0] == places[0]
-    gaps = [math.dist(a, b) for a, b in zip(last, last[1:], strict=False)]
+    gaps = [math.dist(a, b) for a, b in itertools.pairwise(last)]
     doubled = 2.0 ** max(0, math.ceil(math.log2(steps / (MOST_POSES / 2))))
     assert max(gaps) < 2.0 * max(STEP_M, SPACING_M) * doubled
     behind = len(places) - 1 - places.index(last[-1])

@@ -143,7 +143,7 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
 
 def ros_type(spec: Spec) -> str:
     """Name a parameter's type as ROS does: double, string[] and so on."""
-    return _TYPES[spec.type].name.lower().replace("_array", "[]")
+    return str(_TYPES[spec.type].name).lower().replace("_array", "[]")
 
 
 def reasons(names: Iterable[str], fixed: Mapping[str, str]) -> dict[str, str]:

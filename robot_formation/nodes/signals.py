@@ -1,4 +1,4 @@
-"""Signals that ask a node to end, as a flag, set up before anything of ROS is loaded: a signal never interrupts an import."""
+"""Signals that ask a node to end, as a flag that is set up before ROS is loaded: none interrupts an import."""
 
 from __future__ import annotations
 
