@@ -86,7 +86,7 @@ def test_the_choices_of_a_surface_are_in_its_description(lab):
     lab.until(client.service_is_ready)
     future = client.call_async(DescribeParameters.Request(names=["surface"]))
     lab.until(future.done)
-    assert "one of: bowl, plane" in future.result().descriptors[0].additional_constraints
+    assert "known: bowl, plane" in future.result().descriptors[0].additional_constraints
 
 
 def test_a_flood_of_bad_messages_is_a_few_lines(lab):

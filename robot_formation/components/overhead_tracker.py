@@ -26,7 +26,7 @@ class OverheadTrackerNodeParameters(OverheadTrackingParameters):
         (0.16, 0.16), "Start of each robot's base_link in the world", unit="m", low=-10.0, high=100.0
     )
     surface: str = parameter(
-        "bowl", "Name of the surface that a calibration with knows_surface means", choices=tuple(SURFACES)
+        "bowl", "Name of the surface that a calibration with knows_surface means", known=tuple(SURFACES)
     )
     surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
 

@@ -32,7 +32,7 @@ class WorldNodeParameters(WorldParameters):
     """The world's parameters, its surface, its robots and where they start."""
 
     seed: int = parameter(0, "Seed of every random stream", low=0, high=2**63 - 1)
-    surface: str = parameter("bowl", "Name of the surface", choices=tuple(SURFACES))
+    surface: str = parameter("bowl", "Name of the surface", known=tuple(SURFACES))
     surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
     robots: tuple[str, ...] = parameter(("leader", "follower_1"), "Names of the robots; followers carry a camera")
     start_x_m: tuple[float, ...] = parameter((0.76, 1.08), "Start of each robot's base_link in the world", unit="m")

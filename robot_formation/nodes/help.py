@@ -68,6 +68,8 @@ def _parameter(spec: Spec) -> Iterable[str]:
     limits = ""
     if spec.choices:
         limits = f"; one of {', '.join(map(str, spec.choices))}"
+    elif spec.known:
+        limits = f"; known: {', '.join(spec.known)}"
     elif spec.low is not None or spec.high is not None:
         low, high = ("-inf" if spec.low is None else spec.low), ("inf" if spec.high is None else spec.high)
         limits = f"; {low} to {high}{unit}"

@@ -191,6 +191,8 @@ def _descriptor(spec: Spec, fixed: str) -> ParameterDescriptor:
     constraints = [f"read-only: {fixed}"] if fixed else []
     if spec.choices:
         constraints.append("one of: " + ", ".join(map(str, spec.choices)))
+    if spec.known:
+        constraints.append("known: " + ", ".join(spec.known))
     descriptor.additional_constraints = "; ".join(constraints)
     low, high = spec.low, spec.high
     if low is not None or high is not None:
