@@ -35,7 +35,10 @@ class ParameterError(FormationError):
 
 @dataclass(frozen=True)
 class Spec:
-    """One parameter: dotted name, Python type, default, unit, closed range or choices, description."""
+    """One parameter: dotted name, Python type, default, unit, closed range or choices, description.
+
+    `known` lists names that it can have where whoever uses them looks them up, and complains.
+    """
 
     name: str
     type: Any
@@ -45,6 +48,7 @@ class Spec:
     high: float | None
     choices: tuple[Any, ...]
     description: str
+    known: tuple[str, ...] = ()
 
 
 def parameter(
@@ -55,9 +59,10 @@ def parameter(
     low: float | None = None,
     high: float | None = None,
     choices: tuple[Any, ...] = (),
+    known: tuple[str, ...] = (),
 ) -> Any:
-    """Make a dataclass field that carries its unit, closed range [low, high] or choices, and description."""
-    metadata = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices}
+    """Make a dataclass field that carries what `Spec` lists: unit, closed range [low, high] or choices, description."""
+    metadata = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices, "known": known}
     return dataclasses.field(default=default, metadata=metadata)
 
 
@@ -82,7 +87,15 @@ def specs(cls: type, prefix: str = "", *, defaults: Any = None) -> dict[str, Spe
         meta = field.metadata
         default = field.default if defaults is None else getattr(defaults, field.name)
         found[name] = Spec(
-            name, kind, default, meta["unit"], meta["low"], meta["high"], tuple(meta["choices"]), meta["description"]
+            name,
+            kind,
+            default,
+            meta["unit"],
+            meta["low"],
+            meta["high"],
+            tuple(meta["choices"]),
+            meta["description"],
+            tuple(meta["known"]),
         )
     return found
 

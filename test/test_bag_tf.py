@@ -7,6 +7,7 @@ from graph_tools import short_scenario
 from rosbags.highlevel import AnyReader
 from synthetic_bag import STORE, odometry, text
 
+from robot_formation.bag.errors import BagError
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import Recorder
@@ -140,4 +141,28 @@ def test_a_closed_chunk_has_its_transforms(tmp_path):
     recorder.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(0, 1.0, 0.0, 0.0)))
     recorder.end_chunk()
     assert len(messages_of(tmp_path / "bag.partial", "/tf")) == 1
+    recorder.close()
+
+
+def test_a_publisher_that_appears_while_transforms_are_made_is_recorded_beside_them(tmp_path):
+    foreign = STORE.types["tf2_msgs/msg/TFMessage"]([])
+    with_robot = Recorder(tmp_path / "bag", {})
+    with_robot.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
+    with_robot.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(10**9, 1.0, 0.0, 0.0)))
+    with_robot.end_chunk()
+    with_robot.add_topic("/tf", "tf2_msgs/msg/TFMessage", TopicQos())
+    with_robot.record("/tf", "tf2_msgs/msg/TFMessage", cdr(foreign))
+    with_robot.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(2 * 10**9, 1.0, 0.0, 0.0)))
+    with_robot.close()
+    found = [[entry.child_frame_id for entry in m.message.transforms] for m in messages_of(tmp_path / "bag", "/tf")]
+    assert sorted(found) == [[], ["base_link"], ["base_link"]]
+
+
+def test_a_topic_of_the_recorders_own_keeps_its_type(tmp_path):
+    recorder = Recorder(tmp_path / "bag", {})
+    recorder.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
+    recorder.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(10**9, 1.0, 0.0, 0.0)))
+    recorder.end_chunk()
+    with pytest.raises(BagError, match="added before"):
+        recorder.add_topic("/tf", STRING, TopicQos())
     recorder.close()

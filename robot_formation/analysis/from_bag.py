@@ -141,12 +141,10 @@ def _robots(bag: Bag) -> list[str]:
 
 def run_topics(robots: Sequence[str]) -> dict[str, str]:
     """Name the topics that the analysis reads, with their message types."""
-    topics = {_absolute(topic.name): topic.type for topic in (names.SURFACE, names.left_plate())}
+    topics = {_absolute(topic.name): topic.type for topic in (names.SURFACE, names.left_plate(), names.OVERHEAD_POSES)}
     for robot in robots:
         odom = names.ground_truth_odom(robot)
         topics[_absolute(odom.name)] = odom.type
-        seen = names.overhead_path(robot)
-        topics[_absolute(seen.name)] = seen.type
         topics.update({f"/{robot}/{topic.name}": topic.type for topic in (*_MOTIONS, names.MOVE, names.ALIGNMENT)})
     return topics
 
@@ -215,22 +213,28 @@ def _track(messages: Sequence[Any]) -> Track | None:
 def _overhead(
     robots: Sequence[str], messages: Mapping[str, Sequence[Any]], dot_height_m: float
 ) -> dict[str, OverheadTrack]:
-    """Compare the tracker's last path of each robot with the true places of its dot."""
+    """Compare where the tracker saw each robot's dot with the dot's true places.
+
+    The tracker tells the places of all robots after each picture, in their order. One that it doesn't see keeps its
+    place to the last bit; one that it sees never does, since pictures are noisy.
+    """
+    told = sorted(messages[_absolute(names.OVERHEAD_POSES.name)], key=_stamp_ns)
+    told = [message for message in told if len(message.poses) == len(robots)]
     tracks = {}
-    for robot in robots:
-        paths = messages[_absolute(names.overhead_path(robot).name)]
+    for number, robot in enumerate(robots):
         truth = messages[_absolute(names.ground_truth_odom(robot).name)]
-        if not paths or not truth:
+        if not told or not truth:
             continue
-        poses = max(paths, key=_stamp_ns).poses
-        stamps = np.array([_stamp_ns(pose) for pose in poses], dtype=np.int64)
-        seen = np.array([_place(pose.pose.position) for pose in poses])
+        places = np.array([_place(message.poses[number].position) for message in told])
+        moved = np.append(True, np.any(places[1:] != places[:-1], axis=1))
+        stamps = np.array([_stamp_ns(message) for message in told], dtype=np.int64)[moved]
+        seen = places[moved]
         true_stamps = np.array([_stamp_ns(message) for message in truth], dtype=np.int64)
         order = np.argsort(true_stamps, kind="stable")
         # A robot that stands says nothing, so its last word before the picture holds.
         index = np.searchsorted(true_stamps[order], stamps, side="right") - 1
         known = index >= 0
-        dots = np.array([_dot(truth[number].pose.pose, dot_height_m) for number in order[index[known]]])
+        dots = np.array([_dot(truth[entry].pose.pose, dot_height_m) for entry in order[index[known]]])
         tracks[robot] = OverheadTrack(stamps[known], seen[known].reshape(-1, 3), dots.reshape(-1, 3))
     return tracks
 

@@ -75,7 +75,9 @@ class Child:
         """Say how it ended."""
         code = self.exit_code or 0
         how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        last = self.last_words()
+        lines = self._text().strip().splitlines()
+        match = _LOG_LINE.match(lines[-1]) if lines else None
+        last = "" if match and match["level"] == "INFO" else self.last_words()  # that it was ready is no reason
         return f"{how}: {last}" if last else how
 
     def last_words(self) -> str:

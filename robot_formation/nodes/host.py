@@ -25,10 +25,13 @@ from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
+from robot_formation.loopback import use_loopback
 from robot_formation.nodes.executor import make_executor
+from robot_formation.nodes.help import help_text
 from robot_formation.nodes.outbox import Outbox
 from robot_formation.nodes.parameters import AT_START, HostParameters, ParameterNode, declare, take_changes
-from robot_formation.nodes.signals import stopped
+from robot_formation.nodes.repetition import Repetitions
+from robot_formation.nodes.signals import ignore_signals, stopped
 from robot_formation.parameters import specs
 
 _IDLE_S = 0.1  # how often an idle node looks for signals
@@ -66,8 +69,13 @@ def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
     Returns:
         The exit code: 2 if what was given at the start is bad, 1 for such an error later, else that of the run.
     """
+    if {"-h", "--help"} & set(sys.argv[1:]):
+        with contextlib.suppress(BrokenPipeError):
+            os.write(sys.stdout.fileno(), (help_text(name) + "\n").encode())
+        return exit_codes.DONE
     node, running = None, False
     try:
+        use_loopback(os.environ)
         # ROS's own handlers would invalidate the context at once, and lose what is still to be sent.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = ParameterNode(name)
@@ -75,7 +83,7 @@ def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
         running = True
         return body.run()
     except _BAD_INPUT as error:
-        print(f"{name}: {error}", file=sys.stderr)
+        print(_complaint(name, str(error)), file=sys.stderr)
         return exit_codes.ERROR if running else exit_codes.BAD_INPUT
     except Exception as error:
         if type(error).__name__ not in ("RCLError", "RCLInvalidROSArgsError", "UnknownROSArgsError"):
@@ -86,6 +94,13 @@ def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+        ignore_signals()
+
+
+def _complaint(name: str, text: str) -> str:
+    """Put the node's name before a message, unless it begins with it, or with the node's full name."""
+    who = text.partition(":")[0]
+    return text if who.rpartition("/")[2] == name else f"{name}: {text}"
 
 
 class Host:
@@ -100,7 +115,7 @@ class Host:
         robot = node.get_namespace().strip("/").rpartition("/")[2]
         if entry.robots and not robot:
             raise FormationError(
-                f"{kind} belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1"
+                f"{kind}: it belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1"
             )
         place = Place(robot if entry.robots else "", self._parameters.formation)
         self._pacer = Pacer(getattr(parameters, "real_time_factor", 0.0))
@@ -115,6 +130,7 @@ class Host:
             warn=self._component.warn,
         )
         self._component.attach(self._outbox.send, self._say)
+        self._repetitions = Repetitions()
         self._delays = random.Random(os.getpid())
         self._publishers: dict[names.Topic, Any] = {}
         self._heard_s = time.monotonic()
@@ -150,6 +166,7 @@ class Host:
         executor.add_node(self._node)
         component, outbox = self._component, self._outbox
         component.start()
+        self._say(0, self._ready())
         try:
             while not stopped() and (component.exit_code is None or outbox.waiting):
                 outbox.flush()
@@ -199,8 +216,15 @@ class Host:
         self._component.set_parameters(parameters)
         self._pacer.factor = getattr(parameters, "real_time_factor", 0.0)
 
-    def _say(self, level: int, text: str) -> None:
+    def _ready(self) -> str:
+        topics = ", ".join(entry.topic.name for entry in self._component.inputs())
+        return f"ready, waiting for {topics}" if topics else "ready"
+
+    def _say(self, level: int, said: str) -> None:
         logger = self._node.get_logger()
+        text = self._repetitions.line(said) if level else said
+        if text is None:
+            return
         # One line each: rclpy refuses different severities from the same line.
         if level == 0:
             logger.info(text)

@@ -16,6 +16,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from robot_formation import conversions, names
+from robot_formation.loopback import PROFILES
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import qos_profile
 
@@ -23,7 +24,7 @@ from robot_formation.nodes.host import qos_profile
 _NAME = "_monitor"
 _QUIET_ROUNDS, _MOST_ROUNDS = 3, 60
 # What a process must have in common with the run's nodes to find them at once, and where rclpy writes its log.
-_JOINING = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOG_DIR")
+_JOINING = (*PROFILES, "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOG_DIR")
 
 
 @contextlib.contextmanager
@@ -60,7 +61,8 @@ class Monitor:
         with _variables({name: environment.get(name) for name in _JOINING}):
             domain = int(environment["ROS_DOMAIN_ID"])
             rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node(_NAME, context=self._context, start_parameter_services=False, enable_rosout=False)
+            # Here too: the middleware reads its settings when the first node is made.
+            self._node = Node(_NAME, context=self._context, start_parameter_services=False, enable_rosout=False)
         self._executor = make_executor(self._context)
         self._executor.add_node(self._node)
         self._listen = listen

@@ -141,6 +141,11 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
     return objects
 
 
+def ros_type(spec: Spec) -> str:
+    """Name a parameter's type as ROS does: double, string[] and so on."""
+    return str(_TYPES[spec.type].name).lower().replace("_array", "[]")
+
+
 def reasons(names: Iterable[str], fixed: Mapping[str, str]) -> dict[str, str]:
     """Tell which of the parameters can't be set while a node runs, and why, by the first pattern that fits."""
     found = {name: next((why for pattern, why in fixed.items() if fnmatchcase(name, pattern)), "") for name in names}
@@ -186,6 +191,8 @@ def _descriptor(spec: Spec, fixed: str) -> ParameterDescriptor:
     constraints = [f"read-only: {fixed}"] if fixed else []
     if spec.choices:
         constraints.append("one of: " + ", ".join(map(str, spec.choices)))
+    if spec.known:
+        constraints.append("known: " + ", ".join(spec.known))
     descriptor.additional_constraints = "; ".join(constraints)
     low, high = spec.low, spec.high
     if low is not None or high is not None:

@@ -68,7 +68,7 @@ class PlayerParameters:
         for text in self.remap:
             source, sign, target = text.partition(":=")
             if not (sign and source.startswith("/") and target):
-                raise ParameterError(f"player: 'remap' takes texts like /from:=/to, not '{text}'")
+                raise ParameterError(f"'remap' takes texts like /from:=/to, not '{text}'")
             found[source] = target
         return found
 
@@ -299,7 +299,7 @@ class Executable:
     def __init__(self, node: ParameterNode) -> None:
         (self._parameters,) = declare(node, PlayerParameters, fixed=PlayerNode.fixed)
         if not self._parameters.bag:
-            raise ParameterError("player: say which bag is played, with the parameter 'bag'")
+            raise ParameterError("say which bag is played, with the parameter 'bag'")
         self._node = node
         self._bag = read_bag(Path(self._parameters.bag))
         self._player = PlayerNode(node, self._bag, self._parameters)
@@ -307,6 +307,7 @@ class Executable:
 
     def run(self) -> int:
         """Play; return the exit code."""
+        self._node.get_logger().info("ready, waiting for subscribers")
         with self._bag:
             report = self._player.run()
         late = ", ".join(f"{name} {value:.2f}" for name, value in (report.schedule or {}).items())
