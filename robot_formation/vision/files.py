@@ -13,12 +13,13 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
-import yaml
 
+from robot_formation.errors import shown
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.vision.block import Block
 from robot_formation.vision.parameters import SIGNATURES, DetectorParameters
 from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError, scaled
+from robot_formation.yaml_files import read_yaml
 
 CAMERA_PARAMETERS = {
     "camera_brightness",
@@ -103,12 +104,7 @@ def read_parameters(path: str | Path, warn: Callable[[str], None]) -> DetectorPa
     Raises:
         ParameterError: if the file can't be read, or a name or value is wrong.
     """
-    try:
-        content = yaml.safe_load(Path(path).read_bytes())
-    except OSError as error:
-        raise ParameterError(f"{path}: can't be read ({error.strerror}); give a YAML or JSON file") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ParameterError(f"{path}: is neither YAML nor JSON ({' '.join(str(error).split())[:120]})") from error
+    content = read_yaml(path, refuse=ParameterError, remedy="give a YAML or JSON file")
     if not isinstance(content, Mapping) or not all(isinstance(name, str) for name in content):
         raise ParameterError(f"{path}: holds no parameters; give lines like 'min_block_area: 20'")
     values = _by_own_names(content, str(path))
@@ -119,12 +115,7 @@ def read_parameters(path: str | Path, warn: Callable[[str], None]) -> DetectorPa
             "the world's camera"
         )
     own = {name: value for name, value in values.items() if name not in CAMERA_PARAMETERS}
-    try:
-        return from_mapping(DetectorParameters, own, where=str(path))
-    except ParameterError:
-        raise
-    except (ValueError, RecursionError) as error:  # a number too long to print, a mapping within itself
-        raise ParameterError(f"{path}: holds a value that can't be used ({error}); correct it") from error
+    return from_mapping(DetectorParameters, own, where=str(path))
 
 
 def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -137,7 +128,7 @@ def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
         known: dict[Any, Any] = ranges if single else values
         key = int(single[1]) if single else name or given
         if key in known:
-            raise ParameterError(f"{where}: '{given}' is given twice; keep one of them")
+            raise ParameterError(f"{where}: {shown(given)} is given twice; keep one of them")
         known[key] = value
     if ranges:
         if "signature_range" in values:
