@@ -48,6 +48,7 @@ setup(
         "mcap",
         "numpy",
         "opencv-python-headless",
+        "pillow",
         "pybullet",
         "rosbags>=0.11.2",
         "zstandard",

@@ -8,8 +8,9 @@ from rosbags.highlevel import AnyReader
 from synthetic_bag import STORE, text
 
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.folder import bag_name
 from robot_formation.bag.qos import TopicQos
-from robot_formation.bag.reader import bag_name, read_bag
+from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import recover
 from robot_formation.bag.writer import BagWriter
 

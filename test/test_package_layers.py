@@ -10,7 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "robot_formation"
 
 LAYERS = [
-    {"", "errors", "exit_codes", "files", "names", "parameters", "paths", "tags", "yaml_files"},
+    {"", "errors", "exit_codes", "files", "names", "parameters", "paths", "png_files", "tags", "yaml_files"},
     {"surface"},
     {"world"},
     {"control", "koopman", "vision"},

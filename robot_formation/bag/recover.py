@@ -12,13 +12,16 @@ from typing import Any
 
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Header, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 
+from robot_formation.bag.chunks import MOST_RECORD_BYTES, chunk_records
 from robot_formation.bag.definitions import Definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.metadata import Span
 from robot_formation.bag.qos import parse_profiles
 from robot_formation.bag.writer import BagWriter
+from robot_formation.errors import shown
+from robot_formation.files import open_file
 
 RECOVERING_SUFFIX = ".recovering"
 """What the new bag's folder is called behind its name while the old one is being copied into it."""
@@ -110,7 +113,7 @@ def is_being_written(path: Path) -> bool:
         BagError: as for `mcap_files`.
     """
     for file in mcap_files(path):
-        with file.open("rb") as stream:
+        with open_file(file) as stream:
             try:
                 fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -145,12 +148,12 @@ class _Copy:
         """Copy one file up to its end or to the first record that is cut off."""
         self.schemas.clear()
         self.channels.clear()
-        with file.open("rb") as stream:
+        with open_file(file) as stream:
             readable = 0
             finished = False
             for record in _readable_records(stream):
                 if isinstance(record, Header) and record.profile != "ros2":
-                    raise BagError(f"{file} is an MCAP file of profile '{record.profile}', not of ROS 2")
+                    raise BagError(f"{file} is an MCAP file of profile {shown(record.profile)}, not of ROS 2")
                 self.take(record)
                 readable = stream.tell()
                 finished = isinstance(record, DataEnd)
@@ -176,7 +179,7 @@ class _Copy:
 
     def unpack(self, chunk: Chunk) -> list[Any]:
         try:
-            return list(breakup_chunk(chunk, validate_crc=True))
+            return chunk_records(chunk)
         # Besides MCAP's own errors the decompressors raise theirs, which have no common base.
         except Exception:
             self.damaged_chunks += 1
@@ -212,7 +215,7 @@ class _Copy:
 def _readable_records(stream: Any) -> Iterator[Any]:
     """Yield a file's records, whole ones only, up to the end of its data section or of what is there."""
     try:
-        for record in StreamReader(stream, emit_chunks=True).records:
+        for record in StreamReader(stream, emit_chunks=True, record_size_limit=MOST_RECORD_BYTES).records:
             yield record
             if isinstance(record, DataEnd):
                 return
@@ -222,5 +225,5 @@ def _readable_records(stream: Any) -> Iterator[Any]:
 
 
 def _has_magic(file: Path) -> bool:
-    with file.open("rb") as stream:
+    with open_file(file) as stream:
         return stream.read(8) == b"\x89MCAP0\r\n"
