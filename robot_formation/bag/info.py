@@ -107,6 +107,7 @@ def info_text(info: BagInfo) -> str:
         ("Messages", str(info.message_count)),
         *((key, info.details[key]) for key in _DETAILS if info.details.get(key)),
     ]
+    facts += [("Warning", warning) for warning in info.warnings]
     if not info.closed:
         facts.insert(0, ("Not closed", f"figures of what 'formation recover {info.path}' would save"))
     lines = []

@@ -18,7 +18,7 @@ from robot_formation.bag.chunks import MOST_RECORD_BYTES, chunk_records
 from robot_formation.bag.definitions import Definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.metadata import Span
-from robot_formation.bag.qos import parse_profiles
+from robot_formation.bag.qos import TopicQos, parse_profiles
 from robot_formation.bag.writer import BagWriter
 from robot_formation.errors import shown
 from robot_formation.files import open_file
@@ -197,11 +197,12 @@ class _Copy:
         if self.types.setdefault(channel.topic, schema.name) != schema.name:
             return
         if channel.topic not in self.writer.message_counts:
-            embedded = Definition(
-                schema.name, schema.encoding, schema.data.decode(), channel.metadata.get("topic_type_hash", "")
-            )
-            profiles = parse_profiles(channel.metadata.get("offered_qos_profiles", ""))
-            self.writer.add_topic(channel.topic, schema.name, profiles, embedded=embedded)
+            try:
+                text = schema.data.decode()
+            except UnicodeDecodeError:
+                return
+            embedded = Definition(schema.name, schema.encoding, text, channel.metadata.get("topic_type_hash", ""))
+            self.writer.add_topic(channel.topic, schema.name, _profiles(channel), embedded=embedded)
         self.writer.write(channel.topic, message.data, message.publish_time, log_time_ns=message.log_time)
         self.span.include(message.log_time)
 
@@ -210,6 +211,13 @@ class _Copy:
             for record in self.waiting_metadata:
                 self.writer.write_metadata(record.name, record.metadata)
             self.waiting_metadata.clear()
+
+
+def _profiles(channel: Channel) -> tuple[TopicQos, ...]:
+    try:
+        return parse_profiles(channel.metadata.get("offered_qos_profiles", ""))
+    except BagError:  # the messages are worth more
+        return ()
 
 
 def _readable_records(stream: Any) -> Iterator[Any]:
