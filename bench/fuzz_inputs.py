@@ -96,7 +96,7 @@ def judged(case, code, out, err):
     if "Traceback" in err:
         return "a traceback is printed"
     lines = [line for line in err.splitlines() if line.strip()]
-    if any(len(line) > LONGEST_LINE for line in lines if not line.startswith(("usage:", " "))):
+    if any(len(line) > LONGEST_LINE for line in lines if not argparse_said(line)):
         return f"a line of {max(map(len, lines))} characters"
     if code == 2 and not (lines and ("formation" in lines[-1] or "error:" in lines[-1])):
         return f"exit code 2 without a reason: {lines[-1:]}"
@@ -106,6 +106,11 @@ def judged(case, code, out, err):
         except (ValueError, ZeroDivisionError):
             return "standard output is no strict JSON"
     return ""
+
+
+def argparse_said(line):
+    """Tell lines that argparse prints, which repeats arguments in full."""
+    return line.startswith(("usage:", " ")) or ": error: " in line
 
 
 def run_case(seed, number, folder):

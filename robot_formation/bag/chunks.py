@@ -21,8 +21,6 @@ from robot_formation.files import size_text
 
 MOST_BYTES = 128 << 20
 """Size of the largest chunk or message that is unpacked; recorders make chunks of 1 to 4 MiB."""
-MOST_RECORD_BYTES = 256 << 20
-"""Size of the largest record of an MCAP file that is read."""
 
 _MESSAGE = 5
 _RECORD = struct.Struct("<BQ")  # kind, length

@@ -17,8 +17,9 @@ from typing import Any
 import zstandard
 
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.mcap_source import MAGIC, has_index
+from robot_formation.bag.mcap_source import has_index
 from robot_formation.bag.place import PARTIAL_SUFFIX
+from robot_formation.bag.records import MAGIC
 from robot_formation.bag.recover import in_order, mcap_files, recover
 from robot_formation.errors import shown
 from robot_formation.files import check_file, open_file, size_text

@@ -3,25 +3,34 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Collection, Iterator
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any, BinaryIO
 
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
-from mcap.records import Channel, Chunk, ChunkIndex, Message
-from mcap.stream_reader import StreamReader
-from mcap.summary import Summary
+from mcap.records import (
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Message,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
 
-from robot_formation.bag.chunks import MOST_RECORD_BYTES, chunk_messages
+from robot_formation.bag.chunks import chunk_messages
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.qos import TopicQos, parse_profiles
+from robot_formation.bag.records import MAGIC, records, summary_place
 from robot_formation.bag.source import RawMessage, Source
 from robot_formation.errors import shown
-from robot_formation.files import open_file, size_text
+from robot_formation.files import open_file
 
-MAGIC = b"\x89MCAP0\r\n"
 _FOREVER_NS = 2**64
 
 # Stamp, and what keeps the order of equal ones: the chunk's place in the file, and the message's in the chunk.
@@ -50,33 +59,37 @@ class McapSource(Source):
         magic = self._stream.read(len(MAGIC))
         if magic != MAGIC:
             raise BagError("the file seems to be empty" if not magic else "the file is no MCAP file")
-        self._stream.seek(0)
-        reader = SeekingReader(self._stream, record_size_limit=MOST_RECORD_BYTES)
-        profile = reader.get_header().profile
+        header = next(records(self._stream, len(MAGIC)), None)
+        profile = header.profile if isinstance(header, Header) else ""
         if profile != "ros2":
             raise BagError(f"the MCAP file's profile is {shown(profile)}, not that of ROS 2")
-        summary = reader.get_summary()
-        if summary is None or summary.statistics is None:
+        found = _summary(self._stream)
+        counts = next(iter(found[Statistics]), None)
+        if counts is None:
             raise BagError("the MCAP file has no index")
-        counts = summary.statistics
         self.message_count = counts.message_count
         self.start_ns, self.end_ns = counts.message_start_time, counts.message_end_time
-        self._chunks = sorted(
-            summary.chunk_indexes, key=lambda index: (index.message_start_time, index.chunk_start_offset)
-        )
+        self._chunks = sorted(found[ChunkIndex], key=lambda index: (index.message_start_time, index.chunk_start_offset))
         self.compressions = frozenset(index.compression or "none" for index in self._chunks)
-        self._take_channels(summary, counts.channel_message_counts)
-        self.records = [(record.name, dict(record.metadata)) for record in reader.iter_metadata()]
+        schemas = {schema.id: schema for schema in found[Schema]}
+        self._take_channels(found[Channel], schemas, counts.channel_message_counts)
+        self.records = []
+        for index in found[MetadataIndex]:
+            record = next(records(self._stream, index.offset), None)
+            if isinstance(record, Metadata):
+                self.records.append((record.name, dict(record.metadata)))
 
-    def _take_channels(self, summary: Summary, counts: dict[int, int]) -> None:
+    def _take_channels(
+        self, channels: Sequence[Channel], schemas: Mapping[int, Schema], counts: Mapping[int, int]
+    ) -> None:
         self.definitions: dict[str, tuple[str, str]] = {}
         self.channels: list[TopicSummary] = []
         self._names: dict[int, tuple[str, str]] = {}
-        for channel in summary.channels.values():
+        for channel in channels:
             if channel.message_encoding != "cdr":
                 encoding = shown(channel.message_encoding)
                 raise BagError(f"{shown(channel.topic)} holds messages encoded as {encoding}, not as CDR")
-            schema = summary.schemas.get(channel.schema_id)
+            schema = schemas.get(channel.schema_id)
             type_name = schema.name if schema else ""
             if schema is not None and schema.encoding:
                 self.definitions.setdefault(schema.name, (schema.encoding, str(schema.data, "utf-8")))
@@ -137,18 +150,18 @@ class McapSource(Source):
         yield from sorted(found, key=lambda item: item[0])
 
     def _chunk(self, index: ChunkIndex) -> Chunk:
-        self._stream.seek(index.chunk_start_offset)
-        stream = ReadDataStream(self._stream)
-        kind, length = stream.read1(), stream.read8()
-        if kind != Opcode.CHUNK or length > MOST_RECORD_BYTES:
-            raise BagError(f"the index names a chunk where there is none of up to {size_text(MOST_RECORD_BYTES)}")
-        return Chunk.read(stream)
+        found = next(records(self._stream, index.chunk_start_offset), None)
+        if not isinstance(found, Chunk):
+            raise BagError("the index names a chunk where there is none")
+        return found
 
     def _loose_messages(self, wanted: dict[int, tuple[str, str]], start: int, stop: int) -> Iterator[RawMessage]:
         """Yield the messages of a file without chunks, which must lie in the order of their stamps."""
         last_ns = 0
         with open_file(self._path) as stream:
-            for record in StreamReader(stream, emit_chunks=True, record_size_limit=MOST_RECORD_BYTES).records:
+            for record in records(stream, len(MAGIC)):
+                if isinstance(record, DataEnd):
+                    return
                 if not isinstance(record, Message) or record.channel_id not in wanted:
                     continue
                 if record.log_time < last_ns:
@@ -166,7 +179,17 @@ def has_index(path: Path) -> bool:
     """Tell whether an MCAP file has what `McapSource` needs; a damaged one has, for its damage has to be told."""
     with open_file(path) as stream:
         try:
-            summary = SeekingReader(stream, record_size_limit=MOST_RECORD_BYTES).get_summary()
+            return bool(_summary(stream)[Statistics])
         except Exception:  # of the library, which has no common base
             return True
-    return summary is not None and summary.statistics is not None
+
+
+def _summary(stream: BinaryIO) -> dict[type, list[Any]]:
+    """Read a file's summary: records by kind."""
+    found: dict[type, list[Any]] = defaultdict(list)
+    place = summary_place(stream)
+    for record in records(stream, place) if place else ():
+        if isinstance(record, Footer):
+            break
+        found[type(record)].append(record)
+    return found

@@ -12,13 +12,13 @@ from typing import Any
 
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Header, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
 
-from robot_formation.bag.chunks import MOST_RECORD_BYTES, chunk_records
+from robot_formation.bag.chunks import chunk_records
 from robot_formation.bag.definitions import Definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.metadata import Span
 from robot_formation.bag.qos import TopicQos, parse_profiles
+from robot_formation.bag.records import MAGIC, records
 from robot_formation.bag.writer import BagWriter
 from robot_formation.errors import shown
 from robot_formation.files import open_file
@@ -223,15 +223,17 @@ def _profiles(channel: Channel) -> tuple[TopicQos, ...]:
 def _readable_records(stream: Any) -> Iterator[Any]:
     """Yield a file's records, whole ones only, up to the end of its data section or of what is there."""
     try:
-        for record in StreamReader(stream, emit_chunks=True, record_size_limit=MOST_RECORD_BYTES).records:
+        if stream.read(len(MAGIC)) != MAGIC:
+            return
+        for record in records(stream, len(MAGIC)):
             yield record
             if isinstance(record, DataEnd):
                 return
     # A cut-off or overwritten record shows as an end of file, a short field, an absurd length or a broken text.
-    except (McapError, struct.error, UnicodeDecodeError, ValueError, MemoryError, OverflowError):
+    except (McapError, struct.error, ValueError, MemoryError, OverflowError):
         return
 
 
 def _has_magic(file: Path) -> bool:
     with open_file(file) as stream:
-        return stream.read(8) == b"\x89MCAP0\r\n"
+        return stream.read(len(MAGIC)) == MAGIC
