@@ -178,6 +178,8 @@ class McapSource(Source):
 def has_index(path: Path) -> bool:
     """Tell whether an MCAP file has what `McapSource` needs; a damaged one has, for its damage has to be told."""
     with open_file(path) as stream:
+        if stream.read(len(MAGIC)) != MAGIC:
+            return True
         try:
             return bool(_summary(stream)[Statistics])
         except Exception:  # of the library, which has no common base

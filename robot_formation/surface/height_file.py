@@ -80,7 +80,7 @@ def _read_npy(path: Path, content: bytes) -> NDArray[np.uint16] | NDArray[np.flo
         return np.array(np.load(stream, allow_pickle=False))
     except (ValueError, EOFError, OSError) as error:
         reason = " ".join(str(error).split())[:120]
-        raise ParameterError(f"height map {path}: the NPY file is damaged ({reason}); export it again") from None
+        raise ParameterError(f"height map {path}: neither a PNG nor a usable NPY file ({reason})") from None
 
 
 def _check_shape(path: Path, shape: tuple[int, ...]) -> None:
