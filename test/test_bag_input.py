@@ -18,6 +18,7 @@ from robot_formation.analysis.from_bag import load_displacements, load_run
 from robot_formation.bag import chunks
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.info import bag_info, info_text
+from robot_formation.bag.playback import make_excerpt
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import recover
 from robot_formation.bag.transforms import Transforms
@@ -114,6 +115,9 @@ def test_a_bag_that_holds_less_than_its_index_says_is_refused_while_it_is_read(r
     struct.pack_into("<I", data, footer + 25, 0)
     file.write_bytes(data)
     assert f"says that it holds {count + 7} messages" in refused(raw, run)
+    with read_bag(run) as bag:
+        excerpt = make_excerpt(bag, frozenset(bag.topics), {})
+        assert f"says that it holds {count + 7} messages" in refused(list, excerpt.scheduled(bag))
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite"])
@@ -137,6 +141,8 @@ def test_bags_that_rosbag2_compressed_file_by_file_are_read(run, tmp_path, monke
     assert raw(run) == whole
     assert raw(packed) == whole
     assert bag_info(run).compression == "zstd (file)"
+    for path in (run, packed):
+        assert "compressed as a whole" in refused(recover, path, tmp_path / "saved") or storage == "sqlite"
     packed.write_bytes(packed.read_bytes()[:-20])
     assert str(run) in refused(raw, run)
     assert list(scratch.iterdir()) == []

@@ -171,7 +171,7 @@ class Bag:
                 break
             counted[raw.topic] += 1
             yield raw
-        if start_ns is None and stop_ns is None:
+        if (start_ns is None or start_ns <= self.start_ns) and (stop_ns is None or stop_ns > self.end_ns):
             self._check_complete(wanted, counted)
 
     def _check_complete(self, wanted: Collection[str], counted: Counter[str]) -> None:

@@ -101,6 +101,8 @@ def mcap_files(path: Path) -> list[Path]:
     if not path.exists():
         raise BagError(f"{path} doesn't exist; give a bag's folder or an .mcap file")
     files = sorted(path.glob("*.mcap"), key=in_order) if path.is_dir() else [path]
+    if path.name.endswith(".zstd") or (not files and any(path.glob("*.zstd"))):
+        raise BagError(f"{path} holds files that were compressed as a whole; unpack them with 'zstd -d' first")
     if not files or files[0].suffix != ".mcap":
         raise BagError(f"{path} is not a bag; give a folder that 'ros2 bag' or this project wrote, or an .mcap file")
     return files
