@@ -49,6 +49,7 @@ setup(
         "mcap>=1.5.0",
         "numpy>=1.26.4",
         "opencv-python-headless>=4.6.0.66",
+        "pillow>=10.2.0",
         "pybullet>=3.2.6",
         "rosbags>=0.11.6",
         "zstandard>=0.22.0",

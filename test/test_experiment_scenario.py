@@ -305,10 +305,10 @@ def test_a_wrong_file_is_answered_in_one_line_that_names_it(write, text, words):
 
 
 def test_a_missing_file_a_folder_and_a_picture_are_no_scenarios(tmp_path):
-    assert "can't read it: No such file" in one_line(load, tmp_path / "missing.yaml")
-    assert "can't read it" in one_line(load, tmp_path)
+    assert "can't be read (No such file" in one_line(load, tmp_path / "missing.yaml")
+    assert "can't be read" in one_line(load, tmp_path)
     (tmp_path / "picture.yaml").write_bytes(b"\x89PNG\xff\xfe")
-    assert "can't read it" in one_line(load, tmp_path / "picture.yaml")
+    assert "no text in UTF-8" in one_line(load, tmp_path / "picture.yaml")
 
 
 @pytest.mark.parametrize("text", ["", "- 1\n", "drive: {}\n", "'/**': 3\n", "'/**': {ros__parameters: 3}\n"])

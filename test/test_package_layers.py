@@ -10,7 +10,10 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "robot_formation"
 
 LAYERS = [
-    {"", "errors", "exit_codes", "loopback", "names", "parameters", "paths", "tags"},
+    {
+        *("", "errors", "exit_codes", "files", "loopback", "names", "parameters", "paths", "png_files", "tags"),
+        "yaml_files",
+    },
     {"surface"},
     {"world"},
     {"control", "koopman", "vision"},

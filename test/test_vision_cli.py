@@ -220,14 +220,14 @@ def test_one_file_of_parameters_serves_teach_and_detect(files, capsys):
         ("{Min brightness: 0.1, min_brightness: 0.2}", "'min_brightness' is given twice"),
         ("LED brightness: 20001", "outside 0 to 20000 uA"),
         ("'': 1", "no parameter ''"),
-        ("min_block_area: &a {b: *a}", "holds a value that can't be used"),
-        (f"min_block_area: 0x{'f' * 5000}", "holds a value that can't be used"),
+        ("min_block_area: &a {b: *a}", "inside what it refers to"),
+        (f"min_block_area: 0x{'f' * 5000}", "larger than any number"),
         ("min_block_area: {a: 1}", "no parameter 'min_block_area.a'"),
         ("[1, 2]", "holds no parameters"),
         ("1: 2", "holds no parameters"),
         ("speed: 3", "no parameter 'speed'"),
         ("min_block_area: 1", "outside"),
-        ("a: [", "neither YAML nor JSON"),
+        ("a: [", "no valid YAML"),
     ],
 )
 def test_wrong_parameters_are_refused(files, text, message):

@@ -99,6 +99,8 @@ def load_displacements(path: str | Path, robot: str) -> DisplacementLog:
         messages: dict[str, list[Any]] = defaultdict(list)
         for message in bag.messages(topics):
             messages[message.topic].append(message.message)
+    if not messages[f"/{robot}/{names.DISPLACEMENT.name}"]:
+        raise AnalysisError(f"{path} has no displacements of '{robot}'; give the bag of a run with finished timesteps")
     by_stamp = [{entry.stamp_ns: entry.motion for entry in _stamped(messages[topic])} for topic in topics]
     stamps = sorted(by_stamp[0])
     columns = [

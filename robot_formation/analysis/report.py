@@ -12,7 +12,7 @@ from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.figures import draw_corrections, draw_trajectory
 from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, Timestep
 from robot_formation.analysis.record import RunRecord
-from robot_formation.bag.reader import bag_name
+from robot_formation.bag.folder import bag_name
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
 from robot_formation.control.motion import Motion
 

@@ -20,6 +20,7 @@ _DESCRIPTIONS = re.compile(r".*/([^/]+)/robot_description")
 _ODOMETRY, _STRING = "nav_msgs/msg/Odometry", "std_msgs/msg/String"
 
 Vector = tuple[float, float, float]
+_MOST_CHARACTERS = 10_000_000
 
 
 class TransformMessage(NamedTuple):
@@ -75,9 +76,11 @@ def _of_odometry(message: Any) -> Any:
 def _of_description(robot: str, text: str) -> Iterator[Any]:
     """Make one transform per joint of a URDF; a text that is none gives none."""
     types = jazzy_typestore().types
+    if len(text) > _MOST_CHARACTERS or "<!DOCTYPE" in text:
+        return  # a description declares no entities, which small texts can make huge
     try:
-        joints = ElementTree.fromstring(text).iter("joint")
-    except ElementTree.ParseError:
+        joints = list(ElementTree.fromstring(text).iter("joint"))
+    except (ElementTree.ParseError, ValueError):
         return
     for joint in joints:
         parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
@@ -85,7 +88,10 @@ def _of_description(robot: str, text: str) -> Iterator[Any]:
             continue
         place, turn = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         if origin is not None:
-            place, turn = _vector(origin.get("xyz", "0 0 0")), _vector(origin.get("rpy", "0 0 0"))
+            try:
+                place, turn = _vector(origin.get("xyz", "0 0 0")), _vector(origin.get("rpy", "0 0 0"))
+            except ValueError:  # neither three nor numbers
+                continue
         header = types["std_msgs/msg/Header"](
             types["builtin_interfaces/msg/Time"](0, 0), f"{robot}/{parent.get('link', '')}"
         )

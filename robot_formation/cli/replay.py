@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robot_formation.errors import FormationError
+from robot_formation.errors import FormationError, shown
 
 if TYPE_CHECKING:
     from robot_formation.control.motion import Motion
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _changes(kind: str, settings: Sequence[str]) -> dict[str, Any]:
     """Read --set as `formation run` does; settings of other nodes are refused."""
-    import yaml
+    from robot_formation.yaml_files import YamlError, parse_yaml
 
     found = {}
     for setting in settings:
@@ -86,9 +86,9 @@ def _changes(kind: str, settings: Sequence[str]) -> dict[str, Any]:
                 f"--set takes a parameter of the node that is replayed, {kind}.NAME=VALUE, not '{setting}'"
             )
         try:
-            found[name] = yaml.safe_load(text)
-        except yaml.YAMLError:
-            raise FormationError(f"--set {key}: '{text}' is no YAML value") from None
+            found[name] = parse_yaml(text)
+        except YamlError as error:
+            raise FormationError(f"--set {key}: {shown(text)} is no YAML value: {error.problem}") from None
     return found
 
 

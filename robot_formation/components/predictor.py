@@ -12,6 +12,7 @@ import numpy as np
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.control.motion import Motion
+from robot_formation.files import MOST_RECORD_BYTES, read_file
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
 
 _MOST_UNPAIRED = 16  # timesteps of which not all parts have come: in a run, one at a time
@@ -40,8 +41,8 @@ class PredictorComponent(Component):
         if not self._state_file.exists():
             return Predictor(parameters)
         try:
-            state = json.loads(self._state_file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            state = json.loads(read_file(self._state_file, MOST_RECORD_BYTES))
+        except (OSError, ValueError, RecursionError) as error:
             raise PredictionError(f"{self._state_file}: can't read the predictor's state: {error}") from None
         try:
             return Predictor.from_state(parameters, state)

@@ -9,17 +9,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from robot_formation import names
 from robot_formation.components.catalogue import KINDS, NodeKind
 from robot_formation.control.motion import FORMATION_DISTANCE_M
-from robot_formation.errors import FormationError
+from robot_formation.errors import FormationError, shown
 from robot_formation.experiment.camera_facts import check_camera
 from robot_formation.experiment.drive_curves import check_curves
 from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
+from robot_formation.yaml_files import YamlError, parse_yaml, read_yaml
 
 # Parameters that follow from the setup, and what to set instead.
 _FIXED = {
@@ -169,7 +168,7 @@ def load(path: Path) -> Scenario:
         ScenarioError: if it can't be read or isn't a mapping.
         ParameterError: on unknown or wrong entries.
     """
-    content = read_yaml(path)
+    content = _read(path)
     if not isinstance(content, Mapping):
         raise ScenarioError(
             f"{path}: a scenario is a mapping with entries like 'seed' and 'leader'; see config/scenarios"
@@ -185,8 +184,8 @@ def load(path: Path) -> Scenario:
         section = content.get(kind, {})
         section = {} if section is None else section  # an entry with nothing below it
         if not isinstance(section, Mapping):
-            raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {section!r}")
-        sections[kind] = _checked(kind, flatten(section), where=f"{path}: {kind}")
+            raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {shown(section)}")
+        sections[kind] = _checked(kind, flatten(section, where=f"{path}: {kind}"), where=f"{path}: {kind}")
     return Scenario(setup, sections)
 
 
@@ -211,9 +210,9 @@ def override(scenario: Scenario, settings: Sequence[str]) -> Scenario:
         if not equals:
             raise ScenarioError(f"--set takes KEY=VALUE, like predictor.forgetting=0.95, not '{setting}'")
         try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError:
-            raise ScenarioError(f"--set {key}: '{text}' is no YAML value") from None
+            value = parse_yaml(text)
+        except YamlError as error:
+            raise ScenarioError(f"--set {key}: {shown(text)} is no YAML value: {error.problem}") from None
         values.append((key, value))
     return with_values(scenario, values)
 
@@ -234,7 +233,7 @@ def with_values(scenario: Scenario, values: Sequence[tuple[str, Any]]) -> Scenar
         if not dot and key not in setup:
             raise ParameterError(f"--set: no entry '{key}'{suggestion(key, [*setup, *(f'{k}.' for k in KINDS)])}")
         if dot:
-            sections.setdefault(kind, {}).update(flatten({name: value}))
+            sections.setdefault(kind, {}).update(flatten({name: value}, where="--set"))
         else:
             setup[key] = value
     checked = {kind: _checked(kind, section, where=f"--set: {kind}") for kind, section in sections.items()}
@@ -271,25 +270,12 @@ def parameter_file(path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _parameter_file(path: Path, changed_ns: int) -> dict[str, Any]:
-    content = read_yaml(path)
+    content = _read(path)
     try:
-        return flatten(content["/**"]["ros__parameters"])
+        return flatten(content["/**"]["ros__parameters"], where=str(path))
     except (KeyError, TypeError, AttributeError):
         raise ScenarioError(f"{path}: a ROS parameter file begins with '/**:' and 'ros__parameters:'") from None
 
 
-def read_yaml(path: Path) -> Any:
-    """Read a YAML file safely.
-
-    Raises:
-        ScenarioError: if it is missing, unreadable or no YAML.
-    """
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: can't read it: {getattr(error, 'strerror', None) or error}") from None
-    except (yaml.YAMLError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f" in line {mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
-        raise ScenarioError(f"{path}: no valid YAML{where}: {problem}") from None
+def _read(path: Path) -> Any:
+    return read_yaml(path, refuse=ScenarioError, remedy="give a scenario's YAML file, like those in config/scenarios")

@@ -22,6 +22,7 @@ from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.ideal import IDEAL, IdealRun
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.memory import run_in_memory
+from robot_formation.files import MOST_RECORD_BYTES, check_file, read_file
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.parameters import suggestion
 from robot_formation.surface import SURFACES
@@ -202,9 +203,9 @@ class Table:
     @staticmethod
     def _require_same(record: Path, plan: Plan) -> None:
         try:
-            earlier = json.loads(record.read_text(encoding="utf-8"))
+            earlier = json.loads(read_file(record, MOST_RECORD_BYTES))
             settings = list(earlier["settings"])
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise SweepError(f"{record}: no record of a sweep; choose another --out") from None
         if settings != list(plan.settings):
             raise SweepError(f"{record.parent} holds a sweep with other settings ({settings}); choose another --out")
@@ -218,6 +219,7 @@ def read_rows(path: Path) -> Iterator[Row]:
     """
     columns = {field.name: str(field.type) for field in fields(Row)}
     try:
+        check_file(path)
         with path.open(newline="", encoding="utf-8") as file:
             lines = file.readlines()
     except (OSError, ValueError) as error:

@@ -20,8 +20,9 @@ from robot_formation import conversions, exit_codes, names
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.playback import Excerpt, Playhead, Prefetch, ScheduleErrors, make_excerpt
-from robot_formation.bag.reader import Bag, RawMessage, read_bag
+from robot_formation.bag.reader import Bag, read_bag
 from robot_formation.bag.selection import Selection
+from robot_formation.bag.source import RawMessage
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import qos_profile
 from robot_formation.nodes.keyboard import Keyboard
