@@ -130,9 +130,10 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], *, where: str) -> T:
 
 
 def suggestion(name: str, known: typing.Iterable[str]) -> str:
-    """Say which known name was probably meant, or list what there is."""
+    """Say which known name was probably meant, whatever its case, or list what there is."""
     candidates = list(known)
-    near = difflib.get_close_matches(name, candidates, n=1)
+    folded = {candidate.casefold(): candidate for candidate in reversed(candidates)}
+    near = [folded[match] for match in difflib.get_close_matches(name.casefold(), folded, n=1)]
     if not near:
         near = [c for c in candidates if c.rsplit(".", 1)[-1] == name.rsplit(".", 1)[-1]][:1]
     if near:

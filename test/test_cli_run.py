@@ -17,7 +17,7 @@ FAST = ("--camera", "on_demand", "--in-process")
     ("arguments", "words"),
     [
         (("run", "--track", "tow"), ["no track 'tow'", "'two'"]),
-        (("run", "--predictor", "mesured"), ["'mesured'", "'measured'"]),
+        (("run", "--predictor", "mesured"), ["--predictor can't be 'mesured'", "'measured'"]),
         (("run", "--surface", "bowel"), ["no surface 'bowel'", "'bowl'"]),
         (("run", "--camera", "streem"), ["'streem'", "'stream'"]),
         (("run", "--set", "predictor.forgeting=0.9"), ["'forgeting'", "'forgetting'"]),
@@ -32,7 +32,7 @@ FAST = ("--camera", "on_demand", "--in-process")
         (("run", "--real-time-factor", "-1"), ["--real-time-factor", "outside"]),
         (("run", "--track", "one", "--scenario", "x.yaml"), ["not allowed with"]),
         (("run", "--scenario", "missing.yaml"), ["missing.yaml", "No such file"]),
-        (("rnu",), ["invalid choice"]),
+        (("rnu",), ["no verb 'rnu'", "'run'"]),
         (("analyze", "missing_bag"), ["missing_bag"]),
         (("analyze", __file__), ["bag"]),
     ],

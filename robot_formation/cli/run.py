@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.cli.parser import number, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def add_parser(subparsers: Any) -> None:
     what.add_argument("--track", metavar="NAME", help="preset track: one, two (default), ... (see 'formation list')")
     what.add_argument("--scenario", metavar="FILE", type=Path, help="YAML file like those in config/scenarios")
     parser.add_argument("--predictor", metavar="NAME", help="previous, literal, measured, ... (see 'formation list')")
-    parser.add_argument("--seed", metavar="N", type=int, help="seed of every random stream")
+    parser.add_argument("--seed", metavar="N", type=whole_number, help="seed of every random stream")
     parser.add_argument("--surface", metavar="NAME", help="bowl, plane, ... (see 'formation list')")
     parser.add_argument(
         "--set",
@@ -45,7 +46,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--bag", metavar="PATH", type=Path, help="folder of the bag (default: a new one in bags/)")
     parser.add_argument("--images", action="store_true", help="record pictures too (126 MB per thousand)")
     parser.add_argument(
-        "--real-time-factor", metavar="X", type=float, help="0: as fast as possible (default), 1: real time"
+        "--real-time-factor", metavar="X", type=number, help="0: as fast as possible (default), 1: real time"
     )
     parser.add_argument(
         "--camera", metavar="MODE", help="stream (every frame, default) or on_demand (requested frames)"

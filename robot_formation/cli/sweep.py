@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_formation import exit_codes
+from robot_formation.cli.parser import whole_number
 from robot_formation.errors import FormationError
 
 DESCRIPTION = """\
@@ -38,7 +39,9 @@ def add_parser(subparsers: Any) -> None:
         help="predictors (default: previous,measured,formation)",
     )
     parser.add_argument("--seeds", metavar="FIRST:END", default="0:20", help="seeds FIRST to END - 1 (default: 0:20)")
-    parser.add_argument("--jobs", metavar="N", type=int, default=os.cpu_count() or 1, help="runs at the same time")
+    parser.add_argument(
+        "--jobs", metavar="N", type=whole_number, default=os.cpu_count() or 1, help="runs at the same time"
+    )
     parser.add_argument("--dask", metavar="SCHEDULER", help="address of a Dask scheduler, instead of --jobs")
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the results (default: a new one in bags/)")
     parser.add_argument(

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from robot_formation.cli.parser import whole_number
+
 DESCRIPTION = """\
 Teach a colour signature from an image: from a rectangle, as "Set signature" does in PixyMon, or growing from a point,
 as the camera's button does from the picture's centre (158,104). Pixels of the 316 x 208 picture. With --out, an
@@ -22,7 +24,12 @@ def add_parser(subparsers: Any) -> None:
     place.add_argument("--region", metavar="X,Y,W,H", type=_numbers(4), help="rectangle to teach")
     place.add_argument("--point", metavar="X,Y", type=_numbers(2), help="point to grow from")
     parser.add_argument(
-        "--signature", metavar="N", type=int, choices=range(1, 8), default=1, help="number, 1 to 7 (default: 1)"
+        "--signature",
+        metavar="N",
+        type=whole_number,
+        choices=range(1, 8),
+        default=1,
+        help="number, 1 to 7 (default: 1)",
     )
     parser.add_argument(
         "--parameters", metavar="FILE", type=Path, help="parameters by our names or PixyMon's, YAML or JSON"
