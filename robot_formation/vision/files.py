@@ -1,4 +1,4 @@
-"""Pictures and parameters of the detector from files, and pictures with their blocks drawn in."""
+"""Pictures and parameters of the detector from files."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,8 @@ import numpy.typing as npt
 import yaml
 
 from robot_formation.parameters import ParameterError, from_mapping
-from robot_formation.vision.block import Block
 from robot_formation.vision.parameters import SIGNATURES, DetectorParameters
-from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError, scaled
+from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError, same_shape, scaled
 
 CAMERA_PARAMETERS = {
     "camera_brightness",
@@ -29,7 +28,6 @@ CAMERA_PARAMETERS = {
     "min_frames_per_second",
 }
 """What PixyMon offers beside the detector's parameters: it acts on how a picture is taken, in the world's camera."""
-_DRAWN_SCALE = 3
 _STDERR = 2
 _MOST_COMPLAINTS = 4096
 _RANGE = re.compile(rf"signature_([1-{SIGNATURES}])_range")
@@ -56,8 +54,20 @@ def read_picture(path: str | Path, warn: Callable[[str], None]) -> Picture:
         warn(f"{path}: damaged, used as far as it can be read ({complaints[0]:.100})")
     height, width = image.shape[:2]
     if (width, height) != (WIDTH, HEIGHT):
-        warn(f"{path}: {width} x {height} pixels, scaled to {WIDTH} x {HEIGHT}")
+        bars = "" if same_shape(image) else ", the rest of it black, since its shape is another"
+        warn(f"{path}: {width} x {height} pixels, scaled to {WIDTH} x {HEIGHT}{bars}")
     return np.ascontiguousarray(scaled(image)[:, :, ::-1])
+
+
+def check_readable(path: str | Path) -> None:
+    """Check that there is a file to read a picture from, before anything else is looked at.
+
+    Raises:
+        PictureError: if there is none.
+    """
+    if not Path(path).is_file():
+        reason = "No such file" if not Path(path).exists() else "it is no file"
+        raise PictureError(f"{path}: can't be read ({reason}); give an image file")
 
 
 def _decoded(content: npt.NDArray[np.uint8]) -> tuple[Picture | None, list[str]]:
@@ -145,24 +155,3 @@ def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
         default = DetectorParameters().signature_range
         values["signature_range"] = [ranges.get(number + 1, value) for number, value in enumerate(default)]
     return values
-
-
-def write_drawn(path: str | Path, picture: Picture, blocks: Iterable[Block]) -> None:
-    """Write the picture, three times as large, with the blocks' outlines, signatures and indices.
-
-    Raises:
-        PictureError: if the file can't be written.
-    """
-    image = cv2.resize(picture[:, :, ::-1], None, fx=_DRAWN_SCALE, fy=_DRAWN_SCALE, interpolation=cv2.INTER_NEAREST)
-    for block in blocks:
-        left = (block.x - block.width // 2) * _DRAWN_SCALE
-        top = (block.y - block.height // 2) * _DRAWN_SCALE
-        corner = (left + block.width * _DRAWN_SCALE, top + (block.height + 1) * _DRAWN_SCALE)
-        cv2.rectangle(image, (left, top), corner, (255, 255, 255), 1)
-        text = f"s={block.signature:o} i={block.index}"
-        cv2.putText(image, text, (left, max(top - 4, 12)), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (255, 255, 255), 1)
-    content = cv2.imencode(".png", image)[1]
-    try:
-        Path(path).write_bytes(content.tobytes())
-    except OSError as error:
-        raise PictureError(f"{path}: can't be written ({error.strerror}); choose another folder") from error
