@@ -59,10 +59,12 @@ def test_a_picture_without_noise_teaches_too_narrow_a_signature():
     assert kinds(teach_region(clean, (50, 70, 40, 40), 1), clean) == ["narrow"]
 
 
-@pytest.mark.parametrize(("levels", "found"), [(0.25 * LEAST_LEVELS, False), (LEAST_LEVELS, True)])
-@pytest.mark.parametrize("noise", [0.5, 1.0])
+@pytest.mark.parametrize(
+    ("levels", "noise", "found"),
+    [(0.25 * LEAST_LEVELS, 1.0, False), (LEAST_LEVELS, 0.5, True), (LEAST_LEVELS, 1.0, True)],
+)
 @pytest.mark.parametrize("color", [RED, GREEN, BLUE])
-def test_the_least_width_is_what_a_camera_needs_to_find_a_face(levels, found, noise, color):
+def test_the_least_width_is_what_a_camera_needs_to_find_a_face(levels, noise, found, color):
     clean = canvas(((120, 60, 60, 60), color))
     half = levels * (1 << 15) / sum(color) / 2.0 / DEFAULT.range_of(1)
     taught = teach_region(clean, (130, 70, 40, 40), 1)

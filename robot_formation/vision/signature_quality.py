@@ -17,8 +17,8 @@ from robot_formation.vision.teaching import SCALE_BITS
 LIKE = DetectorParameters().signature_teach_threshold
 """Chroma distance in 1/32768 within which the camera, when it teaches from a point, takes colours for the same."""
 LEAST_LEVELS = 4.0
-"""Least width at run time, in levels of a colour channel. A red, green or blue face of 60 px with noise of 0.5 or 1
-level is found in every one of 20 pictures with this width, and in none with 1 level."""
+"""Least width at run time, in levels of a colour channel. A red, green or blue face of 60 px with noise of one level is
+found in each of 20 pictures with this width, and in none where it is one level."""
 MOST_OF_PICTURE = 0.3
 """Share of the picture: the marker's face covers 4 % in formation, and 7 % where robots touch."""
 
