@@ -182,7 +182,7 @@ def cut_off_json(args: argparse.Namespace, scenario: Scenario, result: RunResult
     from robot_formation.launching.processes import run_metadata
 
     facts = run_facts(run_metadata(scenario), in_process=args.in_process)
-    nothing = {"scenario": scenario.setup.name, "outcome": "incomplete", "timesteps": [], "totals": None}
+    nothing: dict[str, Any] = {"scenario": scenario.setup.name, "outcome": "incomplete", "timesteps": [], "totals": None}
     return json.dumps({**nothing, **facts, **_ending(result)}, indent=2)
 
 

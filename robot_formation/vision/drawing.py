@@ -97,7 +97,7 @@ def _label(image: Drawing, text: str, left: int, top: int, bottom: int, colour: 
     x = max(0, min(left, columns - wide))
     cv2.rectangle(image, (x, y), (x + wide, y + tall), (0, 0, 0), -1)
     cv2.putText(image, text, (x + _PAD, y + _PAD + height), _FONT, _FONT_SIZE, colour, _FONT_WIDTH, cv2.LINE_AA)
-    return x + wide
+    return int(x + wide)
 
 
 def _write(path: str | Path, image: Drawing) -> None:
