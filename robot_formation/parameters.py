@@ -134,7 +134,7 @@ def suggestion(name: str, known: typing.Iterable[str]) -> str:
     candidates = list(known)
     folded = {candidate.casefold(): candidate for candidate in reversed(candidates)}
     near = [folded[match] for match in difflib.get_close_matches(name.casefold(), folded, n=1)]
-    if not near:
+    if not near and name:
         near = [c for c in candidates if c.rsplit(".", 1)[-1] == name.rsplit(".", 1)[-1]][:1]
     if near:
         return f"; did you mean '{near[0]}'?"

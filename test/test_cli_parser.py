@@ -118,4 +118,4 @@ def test_names_add_up_and_count_once(parser, arguments, names):
 def test_empty_names_are_refused(parser, capsys, text):
     with pytest.raises(SystemExit):
         parser.parse_args(["--names", text])
-    assert "takes names separated by commas" in capsys.readouterr().err
+    assert "takes one or several, separated by commas" in capsys.readouterr().err

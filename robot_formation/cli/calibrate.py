@@ -167,8 +167,8 @@ def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
     """
     from robot_formation.experiment import scenario as scenarios
 
-    file = args.scenario
-    scenario = scenarios.load(file) if file is not None else scenarios.load_track(args.track or "two")
+    file, track = args.scenario, "two" if args.track is None else args.track
+    scenario = scenarios.load(file) if file is not None else scenarios.load_track(track)
     scenario = scenarios.with_surface(scenario, args.surface)
     if args.seed is not None:
         scenario = scenarios.with_option(scenario, "seed", args.seed, "--seed")

@@ -6,7 +6,8 @@ import argparse
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, NoReturn
 
 from robot_formation.parameters import suggestion
 
@@ -19,6 +20,15 @@ class Parser(argparse.ArgumentParser):
     """
 
     unknown_hint = ""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        """Make a parser as argparse does, but one that refuses empty paths: they would be the current folder."""
+        super().__init__(*args, **kwargs)
+        self.register("type", Path, _path)
+
+    def error(self, message: str) -> NoReturn:
+        """Print usage and message, end with exit code 2."""
+        super().error(message.replace("ignored explicit argument", "takes no value, not"))
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
@@ -98,6 +108,12 @@ def _is_number(text: str) -> bool:
     return True
 
 
+def _path(text: str) -> Path:
+    if not text.strip():
+        raise argparse.ArgumentTypeError(f"{text!r} is no path")
+    return Path(text)
+
+
 def whole_number(text: str) -> int:
     """An argparse type: an integer."""
     try:
@@ -137,7 +153,7 @@ class Names(argparse.Action):
         """Add what was given."""
         names = [name.strip() for name in str(values).split(",")]
         if not all(names):
-            raise argparse.ArgumentError(self, f"takes names separated by commas, not {_short(str(values))}")
+            raise argparse.ArgumentError(self, f"takes one or several, separated by commas, not {_short(str(values))}")
         before = getattr(namespace, self.dest)
         earlier = () if before is self.default else before  # the default goes when names are given
         setattr(namespace, self.dest, tuple(dict.fromkeys([*earlier, *names])))

@@ -107,8 +107,8 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
     """
     from robot_formation.experiment import scenario as scenarios
 
-    file = args.scenario
-    scenario = scenarios.load(file) if file is not None else scenarios.load_track(args.track or "two")
+    file, track = args.scenario, "two" if args.track is None else args.track
+    scenario = scenarios.load(file) if file is not None else scenarios.load_track(track)
     if args.surface is not None:
         scenario = scenarios.with_surface(scenario, args.surface)
     for option, key, value in (
@@ -182,7 +182,12 @@ def cut_off_json(args: argparse.Namespace, scenario: Scenario, result: RunResult
     from robot_formation.launching.processes import run_metadata
 
     facts = run_facts(run_metadata(scenario), in_process=args.in_process)
-    nothing: dict[str, Any] = {"scenario": scenario.setup.name, "outcome": "incomplete", "timesteps": [], "totals": None}
+    nothing: dict[str, Any] = {
+        "scenario": scenario.setup.name,
+        "outcome": "incomplete",
+        "timesteps": [],
+        "totals": None,
+    }
     return json.dumps({**nothing, **facts, **_ending(result)}, indent=2)
 
 

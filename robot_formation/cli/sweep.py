@@ -100,7 +100,11 @@ def run(args: argparse.Namespace) -> int:
     (folder / SUMMARY_NAME).write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
     (folder / TABLE_NAME).write_text(shown + "\n", encoding="utf-8")
     if args.json:
-        files: dict[str, Any] = {"bag": None, "pictures": [], "reason": None}  # no run is recorded or drawn; all came to an end
+        files: dict[str, Any] = {
+            "bag": None,
+            "pictures": [],
+            "reason": None,
+        }  # no run is recorded or drawn; all came to an end
         print(json.dumps({"runs": str(folder / sweep.RUNS_NAME), **said, **files}, indent=2))
     else:
         print(shown)
