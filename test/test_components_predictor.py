@@ -21,7 +21,7 @@ def report(motion, stamp_ns):
 
 @pytest.fixture
 def wire():
-    return wired("predictor", "follower_1")
+    return wired("predictor", "follower_1", name="measured")
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["displacement first", "residual first"])

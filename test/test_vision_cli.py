@@ -47,7 +47,7 @@ def test_teach_prints_the_stored_bounds_and_keeps_the_other_signatures(files, ca
     region = ",".join(map(str, example["region"]))
     assert formation("teach", DATA / example["image"], "--region", region, "--out", out, "--json") == 0
     printed = capsys.readouterr()
-    assert json.loads(printed.out) == {"signatures": [example["result"]]}
+    assert json.loads(printed.out) == {"signatures": [example["result"]], "warnings": []}
     assert printed.err == ""
     stored = load_signatures(out)
     assert stored[0].to_mapping() == example["result"]
@@ -232,6 +232,7 @@ def test_one_file_of_parameters_serves_teach_and_detect(files, capsys):
 )
 def test_wrong_parameters_are_refused(files, text, message):
     (files / "bad.yaml").write_text(text)
+    write_png(files / "any.png", canvas())
     words = ("--signatures", files / "signatures.yaml", "--parameters", files / "bad.yaml")
     with pytest.raises(FormationError, match=message):
         formation("detect", files / "any.png", *words)

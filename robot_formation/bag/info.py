@@ -15,6 +15,7 @@ from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.files import size_text
 
 _DETAILS = ("scenario", "seed", "predictor", "surface", "git_commit", "dropped", "lost")
+_EARLIEST_DATE_NS = 10**18  # September 2001: no clock of a ROS robot has shown an earlier date
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,11 @@ class BagInfo:
         """Messages in the bag."""
         return sum(topic.message_count for topic in self.topics)
 
+    @property
+    def simulated_time(self) -> bool:
+        """Whether the log times are a simulation's seconds since its start, and no dates."""
+        return self.message_count > 0 and self.end_ns < _EARLIEST_DATE_NS
+
     def to_mapping(self) -> dict[str, Any]:
         """Return what `--json` prints."""
         return {
@@ -66,6 +72,7 @@ class BagInfo:
             "ros_distro": self.ros_distro or None,
             "start_ns": self.start_ns,
             "end_ns": self.end_ns,
+            "simulated_time": self.simulated_time,
             "duration_s": (self.end_ns - self.start_ns) / 1e9,
             "messages": self.message_count,
             "topics": [_topic(topic) for topic in self.topics],
@@ -102,8 +109,8 @@ def info_text(info: BagInfo) -> str:
         ("Storage id", f"{info.storage}, compression {info.compression}"),
         ("ROS Distro", info.ros_distro or "unknown"),
         ("Duration", f"{(info.end_ns - info.start_ns) / 1e9:.9f}s"),
-        ("Start", _date(info.start_ns)),
-        ("End", _date(info.end_ns)),
+        ("Start", _date(info.start_ns, simulated=info.simulated_time)),
+        ("End", _date(info.end_ns, simulated=info.simulated_time)),
         ("Messages", str(info.message_count)),
         *((key, info.details[key]) for key in _DETAILS if info.details.get(key)),
     ]
@@ -148,7 +155,7 @@ def _parsed(text: str) -> Any:
         return text
 
 
-def _date(stamp_ns: int) -> str:
+def _date(stamp_ns: int, *, simulated: bool) -> str:
     seconds, nanoseconds = divmod(stamp_ns, 10**9)
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.gmtime(seconds))
-    return f"{when} UTC ({seconds}.{nanoseconds:09d})"
+    return f"{when} UTC ({seconds}.{nanoseconds:09d}){', simulated time' if simulated else ''}"

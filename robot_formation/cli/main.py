@@ -29,6 +29,7 @@ from robot_formation.cli import (
     teach,
     test,
 )
+from robot_formation.cli.parser import Parser
 from robot_formation.errors import FormationError
 
 VERBS = (
@@ -43,7 +44,7 @@ exit codes: 0 done, 2 usage or bad input, 3 leader lost or plate left, 4 a node 
 
 def make_parser() -> argparse.ArgumentParser:
     """Build the parser of all verbs."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="formation",
         description="Robot formation on an unmapped curved surface, with Koopman prediction and a Pixy2 camera.",
         epilog=EPILOG,

@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from robot_formation.analysis.conditions import conditions
 from robot_formation.analysis.quantities import analyse
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
@@ -114,6 +115,12 @@ class Plan:
             for surface in self.surfaces:
                 build(Task(track, surface, self.predictors[0], self.seeds[0]), self.settings).check()
 
+    def conditions(self) -> dict[str, Any]:
+        """List the conditions of all runs by name, as those of a single run."""
+        scenario = build(Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0]), self.settings)
+        found = conditions({kind: scenario.parameters(kind) for kind in ("world", "fine_tuner")})
+        return {**found, "in_process": True}
+
     def tasks(self) -> Iterator[Task]:
         """Yield every run; all predictors of a seed together, so that an unfinished sweep has pairs."""
         for seed in self.seeds:
@@ -204,11 +211,21 @@ class Table:
     def _require_same(record: Path, plan: Plan) -> None:
         try:
             earlier = json.loads(read_file(record, MOST_RECORD_BYTES))
-            settings = list(earlier["settings"])
+            settings = [str(setting) for setting in earlier["settings"]]
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise SweepError(f"{record}: no record of a sweep; choose another --out") from None
         if settings != list(plan.settings):
-            raise SweepError(f"{record.parent} holds a sweep with other settings ({settings}); choose another --out")
+            differing = _difference(settings, plan.settings)
+            raise SweepError(f"{record.parent} holds a sweep with other settings: {differing}; choose another --out")
+
+
+def _difference(earlier: Sequence[str], now: Sequence[str]) -> str:
+    """Say which settings of an earlier sweep differ from those of now."""
+    gone = [setting for setting in earlier if setting not in now]
+    new = [setting for setting in now if setting not in earlier]
+    said = [f"it was made with --set {' --set '.join(gone)}"] if gone else []
+    said += [f"{'and' if gone else 'it was made'} without --set {' --set '.join(new)}"] if new else []
+    return " ".join(said) or f"it was made with them in another order, --set {' --set '.join(earlier)}"
 
 
 def read_rows(path: Path) -> Iterator[Row]:

@@ -1,4 +1,4 @@
-"""Pictures and parameters of the detector from files, and pictures with their blocks drawn in."""
+"""Pictures and parameters of the detector from files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import re
 import tempfile
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,8 @@ from robot_formation.errors import shown
 from robot_formation.files import read_file
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.png_files import png_head, unpacks_within
-from robot_formation.vision.block import Block
 from robot_formation.vision.parameters import SIGNATURES, DetectorParameters
-from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError, scaled
+from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError, same_shape, scaled
 from robot_formation.yaml_files import read_yaml
 
 CAMERA_PARAMETERS = {
@@ -38,7 +37,6 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "PPM", "GIF")
 _MOST_PIXELS = 50_000_000
 _MOST_BYTES = 256 << 20
 _MOST_HEAD_BYTES = 1 << 20
-_DRAWN_SCALE = 3
 _STDERR = 2
 _MOST_COMPLAINTS = 4096
 _RANGE = re.compile(rf"signature_([1-{SIGNATURES}])_range")
@@ -65,7 +63,8 @@ def read_picture(path: str | Path, warn: Callable[[str], None]) -> Picture:
         warn(f"{path}: damaged, used as far as it can be read ({complaints[0]:.100})")
     height, width = image.shape[:2]
     if (width, height) != (WIDTH, HEIGHT):
-        warn(f"{path}: {width} x {height} pixels, scaled to {WIDTH} x {HEIGHT}")
+        bars = "" if same_shape(image) else ", the rest of it black, since its shape is another"
+        warn(f"{path}: {width} x {height} pixels, scaled to {WIDTH} x {HEIGHT}{bars}")
     return np.ascontiguousarray(scaled(image)[:, :, ::-1])
 
 
@@ -97,6 +96,17 @@ def _head(content: bytes) -> bytes:
 
 def _too_large(path: str | Path) -> PictureError:
     return PictureError(f"{path}: has more than {_MOST_PIXELS:,} pixels; scale it down to {WIDTH} x {HEIGHT}")
+
+
+def check_readable(path: str | Path) -> None:
+    """Check that there is a file to read a picture from, before anything else is looked at.
+
+    Raises:
+        PictureError: if there is none.
+    """
+    if not Path(path).is_file():
+        reason = "No such file" if not Path(path).exists() else "it is no file"
+        raise PictureError(f"{path}: can't be read ({reason}); give an image file")
 
 
 def _decoded(content: bytes) -> tuple[Picture | None, list[str]]:
@@ -172,24 +182,3 @@ def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
         default = DetectorParameters().signature_range
         values["signature_range"] = [ranges.get(number + 1, value) for number, value in enumerate(default)]
     return values
-
-
-def write_drawn(path: str | Path, picture: Picture, blocks: Iterable[Block]) -> None:
-    """Write the picture, three times as large, with the blocks' outlines, signatures and indices.
-
-    Raises:
-        PictureError: if the file can't be written.
-    """
-    image = cv2.resize(picture[:, :, ::-1], None, fx=_DRAWN_SCALE, fy=_DRAWN_SCALE, interpolation=cv2.INTER_NEAREST)
-    for block in blocks:
-        left = (block.x - block.width // 2) * _DRAWN_SCALE
-        top = (block.y - block.height // 2) * _DRAWN_SCALE
-        corner = (left + block.width * _DRAWN_SCALE, top + (block.height + 1) * _DRAWN_SCALE)
-        cv2.rectangle(image, (left, top), corner, (255, 255, 255), 1)
-        text = f"s={block.signature:o} i={block.index}"
-        cv2.putText(image, text, (left, max(top - 4, 12)), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (255, 255, 255), 1)
-    content = cv2.imencode(".png", image)[1]
-    try:
-        Path(path).write_bytes(content.tobytes())
-    except OSError as error:
-        raise PictureError(f"{path}: can't be written ({error.strerror}); choose another folder") from error
