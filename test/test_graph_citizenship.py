@@ -16,7 +16,7 @@ from robot_formation import names
 from robot_formation.bag.writer import BagWriter
 from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.in_process import absolute
+from robot_formation.names import absolute
 from robot_formation.parameters import from_mapping
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
@@ -31,7 +31,7 @@ NAMESPACES = {
     "player": SITE,
 }
 # By convention of ROS the same for all.
-OF_ROS = {"/clock", "/diagnostics", "/parameter_events", "/rosout"}
+OF_ROS = {"/diagnostics", "/parameter_events", "/rosout"}
 NEVER = 3600.0
 
 
@@ -46,7 +46,7 @@ def options_of(node, folder):
         "recorder": [f"path:={folder / 'bag'}", "topics:=[follower_1/alignment]"],
         "player": [f"bag:={folder / 'source'}", "paused:=true", "loop:=true", f"wait_s:={NEVER}"],
     }.get(node, [])
-    common = [] if node == "player" else [f"formation:={TICKS}", f"wait_for_listeners_s:={NEVER}"]
+    common = [] if node == "player" else [f"formation_namespace:={TICKS}", f"wait_for_listeners_s:={NEVER}"]
     return [word for parameter in [*common, *own] for word in ("-p", parameter)]
 
 
@@ -125,11 +125,12 @@ def as_typed(name, value):
 def dump(node, parameters):
     """The text that `ros2 param dump` prints: the full name as key, dotted names as nested mappings."""
     nested = {}
-    for name, value in parameters.items():
+    for name, value in sorted(parameters.items()):
         *groups, last = name.split(".")
         inner = nested
         for group in groups:
             inner = inner.setdefault(group, {})
+            assert isinstance(inner, dict), f"'{name}' is in a group that is a parameter too"
         inner[last] = value
     return yaml.dump({full_name(node): {"ros__parameters": nested}}, default_flow_style=False)
 

@@ -11,6 +11,7 @@ from typing import Any
 from mcap.reader import make_reader
 
 from robot_formation.bag.metadata import TopicSummary
+from robot_formation.bag.formation_bag import formation_namespaces
 from robot_formation.bag.reader import Bag, read_bag, storage_files
 from robot_formation.bag.recorder import METADATA_NAME
 
@@ -103,6 +104,9 @@ def info_text(info: BagInfo) -> str:
         ("Messages", str(info.message_count)),
         *((key, info.details[key]) for key in _DETAILS if info.details.get(key)),
     ]
+    formations = formation_namespaces(topic.name for topic in info.topics if topic.message_count)
+    if any(formations):
+        facts.append(("Formations in", ", ".join(namespace or "/" for namespace in formations)))
     if not info.closed:
         facts.insert(0, ("Not closed", f"figures of what 'formation recover {info.path}' would save"))
     lines = []

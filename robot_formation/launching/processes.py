@@ -35,7 +35,9 @@ class Process:
         return {name: value for name, value in self.parameters.items() if value != []}
 
 
-def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, patience_s: float = 60.0) -> list[Process]:
+def processes(
+    scenario: Scenario, bag: Path | None, *, images: bool = False, patience_s: float = 60.0, namespace: str = ""
+) -> list[Process]:
     """List the processes of a run in the order of their start.
 
     Args:
@@ -43,6 +45,7 @@ def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, pat
         bag: where the recorder writes; None for no recorder.
         images: whether pictures are recorded too.
         patience_s: how long a node waits for its listeners.
+        namespace: where the formation lies, absolute; empty: the root.
     """
     host = {
         "wait_for_listeners_s": patience_s,
@@ -54,11 +57,13 @@ def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, pat
         parameters = {
             "path": str(bag),
             "images": images,
+            "own_namespace": True,
             "metadata": [f"{k}={v}" for k, v in run_metadata(scenario).items()],
         }
-        found.append(Process(RECORDER, "/", parameters))
+        found.append(Process(RECORDER, namespace or "/", parameters))
     for kind, robot in scenario.hosts():
-        found.append(Process(kind.name, f"/{robot}", {**scenario.robot_parameters(kind.name, robot), **host}))
+        home = f"{namespace}/{robot}" if robot else namespace or "/"
+        found.append(Process(kind.name, home, {**scenario.robot_parameters(kind.name, robot), **host}))
     return found
 
 

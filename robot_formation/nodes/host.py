@@ -102,7 +102,8 @@ class Host:
             raise FormationError(
                 f"{kind} belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1"
             )
-        place = Place(robot if entry.robots else "", self._parameters.formation)
+        home = node.get_namespace().rpartition("/")[0] if entry.robots else node.get_namespace()
+        place = Place(robot if entry.robots else "", names.absolute(home, self._parameters.formation_namespace))
         self._pacer = Pacer(getattr(parameters, "real_time_factor", 0.0))
         self._component: Component = component_class(parameters, place)
         self._component.wall_clock = time.perf_counter
@@ -110,7 +111,7 @@ class Host:
         self._outbox = Outbox(
             node,
             patience_s=self._parameters.wait_for_listeners_s,
-            recorder=self._parameters.recorder,
+            recorder=names.absolute(home, self._parameters.recorder) if self._parameters.recorder else "",
             record_images=self._parameters.record_images,
             warn=self._component.warn,
         )

@@ -12,7 +12,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from robot_formation.errors import FormationError
-from robot_formation.names import FORMATION
 from robot_formation.parameters import ParameterError, Spec, from_mapping, parameter, specs, suggestion, to_mapping
 
 T = TypeVar("T")
@@ -29,6 +28,8 @@ _TYPES: dict[Any, Parameter.Type] = {
     tuple[str, ...]: Parameter.Type.STRING_ARRAY,
 }
 _LARGE = 1e308
+# Names that parameters had before, of which no suggestion by spelling is sure to find the new one.
+_RENAMED = {"formation": "formation_namespace"}
 AT_START = "it is used while the node starts"
 """Why the parameters that all nodes have can't be set later."""
 
@@ -37,7 +38,9 @@ AT_START = "it is used while the node starts"
 class HostParameters:
     """What every node has beside its own parameters."""
 
-    formation: str = parameter(FORMATION, "Namespace of the formation's done ticks")
+    formation_namespace: str = parameter(
+        "formation", "Namespace of the done ticks; if relative, in the namespace that the robots' lie in"
+    )
     wait_for_listeners_s: float = parameter(
         5.0, "How long a first message is held back for its listeners to appear", unit="s", low=0.0, high=3600.0
     )
@@ -123,7 +126,9 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
     given = {name: value for name, value in node._parameter_overrides.items() if not name.startswith(_OF_RCLPY)}
     for name in given:
         if name not in known:
-            raise ParameterError(f"{where}: no parameter '{name}'{suggestion(name, known)}")
+            now = _RENAMED.get(name, "")
+            hint = f"; it is called '{now}' now" if now in known else suggestion(name, known)
+            raise ParameterError(f"{where}: no parameter '{name}'{hint}")
     values = {name: _plain(known[name], item.value) for name, item in given.items()}
     objects: list[Any] = []
     for cls in classes:

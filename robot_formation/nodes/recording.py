@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from robot_formation import conversions, exit_codes
+from robot_formation import conversions, exit_codes, names
 from robot_formation.bag.definitions import definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.mcap_file import CHUNK_BYTES
@@ -59,6 +59,11 @@ class RecorderParameters:
     images: bool = parameter(
         False, "Record pictures too where 'topics' doesn't name them: noisy frames are 126 MB per thousand"
     )
+    own_namespace: bool = parameter(
+        False,
+        "Record only what lies in the recorder's own namespace where 'topics' doesn't name it, and of /diagnostics what "
+        "is said of the nodes there",
+    )
     time: str = parameter(
         "simulated",
         "Log times: a message's own stamp or the latest one before it (simulated), or the wall clock (receive)",
@@ -78,13 +83,15 @@ class RecorderParameters:
     )  # fmt: skip
     metadata: tuple[str, ...] = parameter((), "Texts 'key=value' for the bag's metadata record")
 
-    def selection(self, resolve: Callable[[str], str]) -> Selection:
-        """Say which topics are meant; `resolve` makes names absolute.
+    def selection(self, resolve: Callable[[str], str], namespace: str) -> Selection:
+        """Say which topics are meant; `resolve` makes names absolute, `namespace` is the recorder's.
 
         Raises:
             BagError: a regular expression is none.
         """
-        return Selection(tuple(resolve(topic) for topic in self.topics), self.regex, self.exclude, self.images)
+        within = namespace.rstrip("/") if self.own_namespace else ""
+        topics = tuple(resolve(topic) for topic in self.topics)
+        return Selection(topics, self.regex, self.exclude, self.images, within)
 
     def write_options(self) -> WriteOptions:
         """Say how the files are written."""
@@ -143,7 +150,7 @@ class RecorderNode:
             raise ParameterError("recorder: say where the bag goes, with the parameter 'path'")
         self._node, self._parameters, self._say = node, parameters, say
         self._warn: Callable[[str], None] = warn or (lambda text: node.get_logger().warning(text))
-        self._selection = parameters.selection(node.resolve_topic_name)
+        self._selection = parameters.selection(node.resolve_topic_name, node.get_namespace())
         self._recorder = Recorder(Path(parameters.path), parameters.texts(), parameters.write_options())
         self._queue = RecordingQueue(self._recorder, parameters.queue_bytes)
         self._receive_time = parameters.time == "receive"
@@ -252,12 +259,20 @@ class RecorderNode:
         self._say(f"recording {name} ({type_name})")
 
     def _on_message(self, topic: str, type_name: str, data: bytes) -> None:
-        if self._health.is_own(topic, data):
+        if self._health.is_own(topic, data) or self._is_of_others(topic, data):
             return
         self._messages += 1
         self._queue.put(topic, type_name, data, time.time_ns() if self._receive_time else None)
         if type_name == _TICK_TYPE:
             self._tick_at = time.monotonic()
+
+    def _is_of_others(self, topic: str, data: bytes) -> bool:
+        """Tell whether a message on the one topic that all formations share says nothing of this one's nodes."""
+        namespace = self._selection.namespace
+        if not namespace or topic != names.DIAGNOSTICS.name or topic in self._selection.topics:
+            return False
+        reports = conversions.from_cdr(data, names.DIAGNOSTICS.type).status
+        return not any(report.name.startswith(f"{namespace}/") for report in reports)
 
     def _on_lost(self, topic: str, info: Any) -> None:
         self._lost[topic] += info.total_count_change
