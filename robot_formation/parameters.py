@@ -142,21 +142,30 @@ def suggestion(name: str, known: typing.Iterable[str]) -> str:
 
 def check(spec: Spec, value: Any, *, where: str) -> Any:
     """Return the value in the parameter's type, or raise ParameterError."""
+    return check_as(spec, value, f"{where}: '{spec.name}'")
+
+
+def check_as(spec: Spec, value: Any, subject: str) -> Any:
+    """Return the value in the parameter's type; errors begin with the subject, like an option of the command line.
+
+    Raises:
+        ParameterError: on a wrong type, or a value outside the range or the choices.
+    """
     if spec.type in _ELEMENTS:
         if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
-            raise ParameterError(f"{where}: '{spec.name}' must be a list, not {value!r}")
-        items = tuple(_check_one(spec, _ELEMENTS[spec.type], item, where) for item in value)
+            raise ParameterError(f"{subject} must be a list, not {value!r}")
+        items = tuple(_check_one(spec, _ELEMENTS[spec.type], item, subject) for item in value)
         if spec.default and not items:
-            raise ParameterError(f"{where}: '{spec.name}' must not be empty")
+            raise ParameterError(f"{subject} must not be empty")
         return items
     kind = spec.type
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
         raise TypeError(f"{spec.name}: optional parameters are not supported; use a neutral default")
-    return _check_one(spec, kind, value, where)
+    return _check_one(spec, kind, value, subject)
 
 
-def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
-    wrong = ParameterError(f"{where}: '{spec.name}' must be of type {kind.__name__}, not {value!r}")
+def _check_one(spec: Spec, kind: type, value: Any, subject: str) -> Any:
+    wrong = ParameterError(f"{subject} must be of type {kind.__name__}, not {value!r}")
     if kind is float and isinstance(value, str) and _EXPONENT.fullmatch(value):
         value = float(value)  # YAML 1.1 takes 1e3, without a dot, for text
     if kind is float:
@@ -167,7 +176,7 @@ def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
         except OverflowError:  # a whole number of more than 308 digits
             value = math.inf
         if not math.isfinite(value):
-            raise ParameterError(f"{where}: '{spec.name}' must be finite, not {value!r}")
+            raise ParameterError(f"{subject} must be finite, not {value!r}")
     elif kind is int:
         if isinstance(value, bool) or not isinstance(value, int):
             raise wrong
@@ -175,11 +184,11 @@ def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
         raise wrong
     if spec.choices and value not in spec.choices:
         hint = suggestion(str(value), [str(c) for c in spec.choices])
-        raise ParameterError(f"{where}: '{spec.name}' can't be {value!r}{hint}")
+        raise ParameterError(f"{subject} can't be {value!r}{hint}")
     low, high = spec.low, spec.high
     if (low is not None and value < low) or (high is not None and value > high):
         limits = f"{'-inf' if low is None else low} to {'inf' if high is None else high} {spec.unit}".rstrip()
-        raise ParameterError(f"{where}: '{spec.name}' is {value!r}, outside {limits}")
+        raise ParameterError(f"{subject} is {value!r}, outside {limits}")
     return value
 
 

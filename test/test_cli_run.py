@@ -29,7 +29,7 @@ FAST = ("--camera", "on_demand", "--in-process")
         (("run", "--set", "world.camera.min_frames_per_second=31"), ["min_frames_per_second", "240"]),
         (("run", "--set", "world.surface_parameters=[depth=1]"), ["depth"]),
         (("run", "--seed", "-1"), ["seed"]),
-        (("run", "--real-time-factor", "-1"), ["real_time_factor"]),
+        (("run", "--real-time-factor", "-1"), ["--real-time-factor", "outside"]),
         (("run", "--track", "one", "--scenario", "x.yaml"), ["not allowed with"]),
         (("run", "--scenario", "missing.yaml"), ["missing.yaml", "No such file"]),
         (("rnu",), ["invalid choice"]),

@@ -170,7 +170,7 @@ def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
     scenario = scenarios.load(file) if file is not None else scenarios.load_track(args.track or "two")
     scenario = scenarios.with_surface(scenario, args.surface)
     if args.seed is not None:
-        scenario = scenarios.with_value(scenario, "seed", args.seed)
+        scenario = scenarios.with_option(scenario, "seed", args.seed, "--seed")
     scenario = scenarios.override(scenario, args.set)
     if not with_curves:
         for node in ("drive", "fine_tuner"):

@@ -102,14 +102,14 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
     scenario = scenarios.load(file) if file is not None else scenarios.load_track(args.track or "two")
     if args.surface is not None:
         scenario = scenarios.with_surface(scenario, args.surface)
-    for key, value in (
-        ("predictor.name", args.predictor),
-        ("seed", args.seed),
-        ("world.camera.mode", args.camera),
-        ("world.real_time_factor", args.real_time_factor),
+    for option, key, value in (
+        ("--predictor", "predictor.name", args.predictor),
+        ("--seed", "seed", args.seed),
+        ("--camera", "world.camera.mode", args.camera),
+        ("--real-time-factor", "world.real_time_factor", args.real_time_factor),
     ):
         if value is not None:
-            scenario = scenarios.with_value(scenario, key, value)
+            scenario = scenarios.with_option(scenario, key, value, option)
     scenario = scenarios.override(scenario, args.set)
     scenario.check()
     return scenario

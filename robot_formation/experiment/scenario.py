@@ -17,7 +17,16 @@ from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.errors import FormationError
 from robot_formation.experiment.camera_facts import check_camera
 from robot_formation.experiment.drive_curves import check_curves
-from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
+from robot_formation.parameters import (
+    ParameterError,
+    check_as,
+    flatten,
+    from_mapping,
+    parameter,
+    specs,
+    suggestion,
+    to_mapping,
+)
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
 
@@ -198,8 +207,13 @@ def _checked(kind: str, section: Mapping[str, Any], *, where: str) -> dict[str, 
     return {name: checked[name] for name in section}
 
 
-def override(scenario: Scenario, settings: Sequence[str]) -> Scenario:
+def override(scenario: Scenario, settings: Sequence[str], *, source: str = "--set") -> Scenario:
     """Apply settings like 'predictor.forgetting=0.95' or 'seed=3'; the value is read as YAML.
+
+    Args:
+        scenario: what is changed.
+        settings: KEY=VALUE each.
+        source: where the user wrote them, for messages.
 
     Raises:
         ScenarioError: if a setting has no '=' or names no node.
@@ -209,13 +223,35 @@ def override(scenario: Scenario, settings: Sequence[str]) -> Scenario:
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not equals:
-            raise ScenarioError(f"--set takes KEY=VALUE, like predictor.forgetting=0.95, not '{setting}'")
-        try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError:
-            raise ScenarioError(f"--set {key}: '{text}' is no YAML value") from None
-        values.append((key, value))
-    return with_values(scenario, values)
+            raise ScenarioError(f"{source} takes KEY=VALUE, like predictor.forgetting=0.95, not '{setting}'")
+        values.append((key, _yaml_value(text, f"{source} {key}")))
+    return with_values(scenario, values, source=source)
+
+
+def _yaml_value(text: str, subject: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ScenarioError(f"{subject}: '{text}' is no YAML value") from None
+
+
+def with_option(scenario: Scenario, key: str, value: Any, source: str) -> Scenario:
+    """Set 'seed' or 'NODE.PARAMETER' from an option of its own; errors name only the option.
+
+    Args:
+        scenario: what is changed.
+        key: an entry of the setup, or a node's parameter.
+        value: the value; a text is read as YAML unless the parameter is a text.
+        source: what the user wrote, like '--seed' or 'seed:='; errors begin with it.
+
+    Raises:
+        FormationError: on a wrong value.
+    """
+    kind, dot, name = key.partition(".")
+    spec = specs(KINDS[kind].parameter_class())[name] if dot else specs(Setup)[key]
+    if isinstance(value, str) and spec.type is not str:
+        value = _yaml_value(value, source)
+    return with_value(scenario, key, check_as(spec, value, source))
 
 
 def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
@@ -223,22 +259,22 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     return with_values(scenario, [(key, value)])
 
 
-def with_values(scenario: Scenario, values: Sequence[tuple[str, Any]]) -> Scenario:
+def with_values(scenario: Scenario, values: Sequence[tuple[str, Any]], *, source: str = "--set") -> Scenario:
     """Set values together, so that only their sum has to make sense. Errors as for `override`."""
     setup = to_mapping(scenario.setup)
     sections = {kind: dict(section) for kind, section in scenario.sections.items()}
     for key, value in values:
         kind, dot, name = key.partition(".")
         if dot and kind not in KINDS:
-            raise ParameterError(f"--set: no node '{kind}'{suggestion(kind, KINDS)}")
+            raise ParameterError(f"{source}: no node '{kind}'{suggestion(kind, KINDS)}")
         if not dot and key not in setup:
-            raise ParameterError(f"--set: no entry '{key}'{suggestion(key, [*setup, *(f'{k}.' for k in KINDS)])}")
+            raise ParameterError(f"{source}: no entry '{key}'{suggestion(key, [*setup, *(f'{k}.' for k in KINDS)])}")
         if dot:
             sections.setdefault(kind, {}).update(flatten({name: value}))
         else:
             setup[key] = value
-    checked = {kind: _checked(kind, section, where=f"--set: {kind}") for kind, section in sections.items()}
-    return Scenario(from_mapping(Setup, setup, where="--set"), checked)
+    checked = {kind: _checked(kind, section, where=f"{source}: {kind}") for kind, section in sections.items()}
+    return Scenario(from_mapping(Setup, setup, where=source), checked)
 
 
 def with_surface(scenario: Scenario, surface: str) -> Scenario:
