@@ -10,7 +10,8 @@ from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from launch.actions import DeclareLaunchArgument, EmitEvent, LogInfo, OpaqueFunction
-from launch.events import Shutdown
+from launch.events import Shutdown, matches_action
+from launch.events.process import ShutdownProcess
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
@@ -28,9 +29,10 @@ from robot_formation.launching.arguments import (
 )
 from robot_formation.launching.launcher import RECORDER_PATIENCE_S
 from robot_formation.launching.outcome import LaunchedRun
-from robot_formation.launching.processes import RECORDER, Process, processes, progress
+from robot_formation.launching.processes import Process, processes, progress
 
 PACKAGE = "robot_formation"
+RUNS = "robot_formation_runs"
 
 
 def nodes(context: LaunchContext) -> list[Node]:
@@ -42,30 +44,38 @@ def nodes(context: LaunchContext) -> list[Node]:
         check_free(bag)
     viewer = is_true(value["rviz"])
     if viewer:
-        check_package("rviz2")
+        check_viewer()
     environment = discovery(value["discovery_range"], context.environment)
     namespace = value["namespace"]
     table = processes(scenario, bag, images=is_true(value["images"]), namespace=namespace)
     table.append(progress(scenario, namespace))
     run = LaunchedRun(len(table), str(bag or ""))
-    started = [node(process, environment, on_exit(run, process)) for process in table]
+    started: list[Node] = []
+    started += [node(process, environment, on_exit(run, process, started)) for process in table]
     if viewer:
-        pushed = context.launch_configurations.get("ros_namespace", "")
-        started.append(rviz(names.absolute(names.absolute("", pushed), namespace), environment))
+        pushed = names.absolute("", context.launch_configurations.get("ros_namespace", ""))
+        started.append(rviz(names.absolute(pushed, namespace), environment))
+    context.extend_globals({RUNS: [*runs(context), run]})
     return started
 
 
-def check_package(name: str) -> None:
-    """Refuse to start without a package that will be needed: nodes that run already would be left alone."""
+def check_viewer() -> None:
+    """Refuse to start without a viewer that is asked for: nodes that ran already would be left alone."""
     try:
-        get_package_prefix(name)
+        get_package_prefix("rviz2")
     except PackageNotFoundError:
-        raise FormationError(f"{name}:=true needs the package {name}, which is not installed; leave it out") from None
+        raise FormationError("rviz:=true needs the package rviz2, which is not installed; leave it out") from None
+
+
+def runs(context: LaunchContext) -> list[LaunchedRun]:
+    """List the runs that were launched together."""
+    found: list[LaunchedRun] = getattr(context.locals, RUNS, [])
+    return found
 
 
 def node(process: Process, environment: dict[str, str], ended: Callable[..., Any]) -> Node:
-    """Make the action that starts a process of the table; the recorder gets more time to write its bag."""
-    patience = dict(zip(("sigterm_timeout", "sigkill_timeout"), map(str, RECORDER_PATIENCE_S), strict=True))
+    """Make the action that starts a process of the table; as long as the recorder may take, so may all."""
+    sigterm_s, sigkill_s = map(str, RECORDER_PATIENCE_S)
     return Node(
         package=PACKAGE,
         executable=process.executable,
@@ -74,23 +84,31 @@ def node(process: Process, environment: dict[str, str], ended: Callable[..., Any
         additional_env=environment,
         output="screen",
         on_exit=ended,
-        **(patience if process.executable == RECORDER else {}),
+        sigterm_timeout=sigterm_s,
+        sigkill_timeout=sigkill_s,
     )
 
 
-def on_exit(run: LaunchedRun, process: Process) -> Callable[..., Any]:
-    """Make the handler of a process's end: the first end ends the launch, the last one says how the run went."""
+def on_exit(run: LaunchedRun, process: Process, nodes: list[Node]) -> Callable[..., Any]:
+    """Make the handler of a process's end: the first end ends the run's other nodes, the last one says how it went."""
 
     def handle(event: Any, context: LaunchContext) -> list[Any]:
-        actions: list[Any] = []
         if run.ended(process.name, process.executable, event.returncode, stopping=context.is_shutdown):
-            actions.append(EmitEvent(event=Shutdown(reason=f"{process.name} has ended")))
-        if run.complete:
-            # An exception is what makes launch end with exit code 1; here it leaves nobody behind.
-            actions.append(OpaqueFunction(function=fail, args=[str(run)]) if run.failed else LogInfo(msg=str(run)))
-        return actions
+            return [EmitEvent(event=ShutdownProcess(process_matcher=matches_action(other))) for other in nodes]
+        return conclusion(run, runs(context)) if run.complete else []
 
     return handle
+
+
+def conclusion(run: LaunchedRun, together: list[LaunchedRun]) -> list[Any]:
+    """Say how a run has ended; the launch ends with the last of those that were launched together."""
+    if not all(other.complete for other in together):
+        return [LogInfo(msg=str(run))]
+    said = [] if run.failed else [LogInfo(msg=str(run))]
+    failed = "; ".join(str(other) for other in together if other.failed)
+    # An exception is what makes launch end with exit code 1; here it leaves nobody behind.
+    end = OpaqueFunction(function=fail, args=[failed]) if failed else EmitEvent(event=Shutdown(reason="the run has ended"))
+    return [*said, end]
 
 
 def fail(context: LaunchContext, text: str) -> None:

@@ -68,7 +68,7 @@ def scenario_of(values: Mapping[str, str]) -> Scenario:
     ):
         if values[name]:
             scenario = scenarios.with_option(scenario, key, values[name], f"{name}:=")
-    scenario = scenarios.override(scenario, split_settings(values["set"]), source="set:=")
+    scenario = scenarios.override(scenario, split_settings(values["set"]), source="set")
     scenario.check()
     return scenario
 
@@ -93,7 +93,7 @@ def split_settings(text: str) -> list[str]:
             found.append(text[begin:place])
             begin = place + 1
     if depth or quote:
-        raise FormationError(f"set:= {text}: a {'quote' if quote else 'bracket'} has no partner")
+        raise FormationError(f"set: {text}: a {'quote' if quote else 'bracket'} has no partner")
     return [setting for setting in [*found, text[begin:]] if setting]
 
 

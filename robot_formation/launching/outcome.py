@@ -43,13 +43,13 @@ class LaunchedRun:
     _ended: int = field(default=0, init=False)
 
     def ended(self, name: str, executable: str, code: int, *, stopping: bool) -> bool:
-        """Take note of a process's end; return whether the run ends with it, so that all others have to end too.
+        """Take note of a process's end; return whether the run ends with it, so that its others have to end too.
 
         Args:
             name: the node's, for people.
             executable: what ran.
             code: its exit code.
-            stopping: whether all processes had been told to end.
+            stopping: whether everything that was launched had been told to end.
         """
         self._ended += 1
         first = self.exit_code is None
@@ -69,8 +69,8 @@ class LaunchedRun:
 
     @property
     def failed(self) -> bool:
-        """Whether the run must count as failed: its leader was lost, or a node died."""
-        return self.exit_code not in (exit_codes.DONE, exit_codes.INTERRUPTED)
+        """Whether the run has ended and must count as failed: its leader was lost, or a node died."""
+        return self.complete and self.exit_code not in (exit_codes.DONE, exit_codes.INTERRUPTED)
 
     def __str__(self) -> str:
         """Say how the run ended, in one line."""
