@@ -155,7 +155,8 @@ def test_rviz_looks_into_the_formations_namespace(launch_file, with_rviz):
     assert remappings["/leader/robot_description"] == "/site/a/leader/robot_description"
 
 
-def test_without_rviz2_nothing_is_started_and_that_is_said(launch_file):
+def test_without_rviz2_nothing_is_started_and_that_is_said(launch_file, monkeypatch, tmp_path):
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
     with pytest.raises(FormationError, match="rviz:=true needs the package rviz2, which is not installed"):
         started(launch_file, rviz="true")
 

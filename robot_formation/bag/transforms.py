@@ -41,9 +41,13 @@ class Transforms:
 
     def take(self, topic: str, type_name: str, cdr: bytes, stamp_ns: int) -> None:
         """Keep a message if it says where a frame is."""
-        pattern = {_ODOMETRY: _POSES, _STRING: _DESCRIPTIONS}.get(type_name)
-        if pattern is not None and (match := pattern.fullmatch(topic)):
+        if match := _matched(topic, type_name):
             self._taken.append((match[1], match[2], type_name, cdr, stamp_ns))
+
+    @staticmethod
+    def wants(topic: str, type_name: str) -> bool:
+        """Tell whether messages of a topic say where frames are."""
+        return _matched(topic, type_name) is not None
 
     def make(self) -> Iterator[TransformMessage]:
         """Make the transforms of what was taken since the last time."""
@@ -64,6 +68,12 @@ class Transforms:
         # All of them each time: whoever asks for the latest message on a latched topic gets one only.
         for namespace, stamps in new.items():
             yield _message(_inside(namespace, names.TF_STATIC), list(self._static[namespace].values()), min(stamps))
+
+
+def _matched(topic: str, type_name: str) -> re.Match[str] | None:
+    """Match a topic that is used: groups are the formation's namespace and the robot."""
+    pattern = {_ODOMETRY: _POSES, _STRING: _DESCRIPTIONS}.get(type_name)
+    return None if pattern is None else pattern.fullmatch(topic)
 
 
 def _inside(namespace: str, topic: names.Topic) -> names.Topic:

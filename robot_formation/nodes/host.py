@@ -18,6 +18,7 @@ from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool, Trigger
 
@@ -26,8 +27,16 @@ from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.nodes.executor import make_executor
+from robot_formation.nodes.live_transforms import LiveTransforms, transform_topics
 from robot_formation.nodes.outbox import Outbox
-from robot_formation.nodes.parameters import AT_START, HostParameters, ParameterNode, declare, take_changes
+from robot_formation.nodes.parameters import (
+    AT_START,
+    HostParameters,
+    ParameterNode,
+    declare,
+    refuse_unused_overrides,
+    take_changes,
+)
 from robot_formation.nodes.signals import stopped
 from robot_formation.parameters import specs
 
@@ -115,7 +124,9 @@ class Host:
             record_images=self._parameters.record_images,
             warn=self._component.warn,
         )
-        self._component.attach(self._outbox.send, self._say)
+        self._component.attach(self._send, self._say)
+        self._transform_topics = transform_topics() if kind == "world" else []
+        self._transforms = LiveTransforms(node.get_namespace()) if self._transform_topics else None
         self._delays = random.Random(os.getpid())
         self._publishers: dict[names.Topic, Any] = {}
         self._heard_s = time.monotonic()
@@ -123,7 +134,7 @@ class Host:
 
     def _connect(self) -> None:
         node = self._node
-        for topic in self._component.outputs():
+        for topic in [*self._component.outputs(), *self._transform_topics]:
             publisher = node.create_publisher(conversions.message_class(topic.type), topic.name, qos_profile(topic.qos))
             self._publishers[topic] = publisher
             self._outbox.add(topic, publisher)
@@ -131,7 +142,15 @@ class Host:
             topic, handler = entry.topic, self._heard(self._delayed(entry.handler))
             # Volatile: a node that joins late must not act on what was said before.
             qos = qos_profile(replace(topic.qos, durability="volatile"))
-            node.create_subscription(conversions.message_class(topic.type), topic.name, handler, qos)
+            # A camera's driver may be best effort: its user may ask for less.
+            options = QoSOverridingOptions.with_default_policies() if topic.type == names.IMAGE_TYPE else None
+            try:
+                node.create_subscription(
+                    conversions.message_class(topic.type), topic.name, handler, qos, qos_overriding_options=options
+                )
+            except RuntimeError as error:  # rclpy's own, for an override that is no value of its policy
+                raise FormationError(f"{node.get_fully_qualified_name()}: {error}") from None
+        refuse_unused_overrides(node)
         for name, service in self._component.services().items():
             node.create_service(Trigger, name, partial(_trigger, service))
         for name, switch in self._component.switches().items():
@@ -170,6 +189,13 @@ class Host:
             executor.shutdown()
             component.close()
         return component.exit_code or 0
+
+    def _send(self, topic: names.Topic, message: Any) -> None:
+        # Transforms first: a recorder that gets the message has found their topics, and makes none of its own.
+        if self._transforms is not None:
+            for name, cdr in self._transforms.of(topic, message):
+                self._outbox.send(name, cdr)
+        self._outbox.send(topic, message)
 
     def _heard(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
         def noted(message: Any) -> None:

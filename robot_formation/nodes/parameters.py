@@ -17,7 +17,8 @@ from robot_formation.parameters import ParameterError, Spec, from_mapping, param
 T = TypeVar("T")
 
 # What rclpy itself declares or reads on every node.
-_OF_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+_QOS = "qos_overrides."
+_OF_RCLPY = ("use_sim_time", "start_type_description_service", _QOS)
 _TYPES: dict[Any, Parameter.Type] = {
     bool: Parameter.Type.BOOL,
     int: Parameter.Type.INTEGER,
@@ -144,6 +145,20 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
             ignore_override=True,
         )
     return objects
+
+
+def refuse_unused_overrides(node: ParameterNode) -> None:
+    """Check that whatever was given for a subscription's quality of service has found one; call it once all are made.
+
+    Raises:
+        ParameterError: naming what has not.
+    """
+    for name in node._parameter_overrides:
+        if name.startswith(_QOS) and not node.has_parameter(name):
+            known = [known for known in node._parameters if known.startswith(_QOS)]
+            raise ParameterError(
+                f"{node.get_fully_qualified_name()}: no parameter '{name}'{suggestion(name, known) if known else ''}"
+            )
 
 
 def reasons(names: Iterable[str], fixed: Mapping[str, str]) -> dict[str, str]:
