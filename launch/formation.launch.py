@@ -106,9 +106,9 @@ def conclusion(run: LaunchedRun, together: list[LaunchedRun]) -> list[Any]:
         return [LogInfo(msg=str(run))]
     said = [] if run.failed else [LogInfo(msg=str(run))]
     failed = "; ".join(str(other) for other in together if other.failed)
-    # An exception is what makes launch end with exit code 1; here it leaves nobody behind.
-    end = OpaqueFunction(function=fail, args=[failed]) if failed else EmitEvent(event=Shutdown(reason="the run has ended"))
-    return [*said, end]
+    if failed:  # an exception is what makes launch end with exit code 1; here it leaves nobody behind
+        return [*said, OpaqueFunction(function=fail, args=[failed])]
+    return [*said, EmitEvent(event=Shutdown(reason="the run has ended"))]
 
 
 def fail(context: LaunchContext, text: str) -> None:

@@ -17,7 +17,7 @@ from robot_formation.parameters import from_mapping, specs
 ROOT = Path(__file__).parent.parent
 NODE_PAGES = ROOT / "docs" / "nodes"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md", *(ROOT / "docs").rglob("*.md")]
-NODES = [*KINDS, "recorder", "player"]
+NODES = [*KINDS, "recorder", "player", "progress"]
 QOS = {
     "event": names.EVENT,
     "history": names.HISTORY,

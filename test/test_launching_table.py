@@ -12,7 +12,6 @@ from robot_formation.experiment import scenario as scenarios
 from robot_formation.launching.processes import processes
 from robot_formation.paths import share_dir
 
-
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
@@ -227,7 +226,8 @@ def test_the_first_end_ends_the_run_and_the_last_one_says_how_it_went(launch_fil
     nodes = [options for options in nodes if options["namespace"] != "leader" or options["executable"] == "leader"]
     context.locals.robot_formation_runs[0].processes = len(nodes)
     actions = ends(launch_file, context, nodes, codes)
-    assert [type(options["event"]).__name__ for name, options in actions if name == "EmitEvent"][0] == "ShutdownProcess"
+    events = [type(options["event"]).__name__ for name, options in actions if name == "EmitEvent"]
+    assert events[0] == "ShutdownProcess"
     assert actions[-1][0] == last
     told = [options["msg"] for name, options in actions if name == "LogInfo"]
     told += [text for name, options in actions if name == "OpaqueFunction" for text in options["args"]]

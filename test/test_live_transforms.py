@@ -27,10 +27,14 @@ def run():
 
 def made_of(run, namespace):
     """What the world would publish, by topic as it names them."""
-    types = {names.absolute("", names.ground_truth_odom(robot).name): names.ground_truth_odom(robot)
-             for robot in ("leader", "follower_1")}
-    types |= {names.absolute("", names.robot_description(robot).name): names.robot_description(robot)
-              for robot in ("leader", "follower_1")}
+    types = {
+        names.absolute("", names.ground_truth_odom(robot).name): names.ground_truth_odom(robot)
+        for robot in ("leader", "follower_1")
+    }
+    types |= {
+        names.absolute("", names.robot_description(robot).name): names.robot_description(robot)
+        for robot in ("leader", "follower_1")
+    }
     live = LiveTransforms(namespace)
     return [made for name, message in run if name in types for made in live.of(types[name], message)]
 

@@ -10,8 +10,8 @@ from typing import Any
 
 from mcap.reader import make_reader
 
-from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.formation_bag import formation_namespaces
+from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.reader import Bag, read_bag, storage_files
 from robot_formation.bag.recorder import METADATA_NAME
 

@@ -1,7 +1,8 @@
 """Transforms for viewers, made from what a run publishes anyway: true poses and robot descriptions.
 
 `/tf` has world -> <robot>/base_link at every true pose. `/tf_static` has the frames of each robot's description (wheels
-at rest) and world -> <robot>/odom, where the robot started. Both lie in the formation's namespace: formations have frames of the same names.
+at rest) and world -> <robot>/odom, where the robot started. Both lie in the formation's namespace: formations have
+frames of the same names.
 """
 
 from __future__ import annotations

@@ -37,7 +37,9 @@ def add_parser(subparsers: Any) -> None:
     source.add_argument("--bag", metavar="BAG", type=Path, help="take the log out of a recorded run instead")
     parser.add_argument("--robot", metavar="NAME", help=f"with --bag: whose log (default: {names.follower(1)})")
     parser.add_argument(
-        "--namespace", metavar="NS", help="with --bag: the formation's namespace, where the bag holds several formations"
+        "--namespace",
+        metavar="NS",
+        help="with --bag: the formation's namespace, where the bag holds several formations",
     )
     parser.add_argument("--out", metavar="LOG.csv", type=Path, help="with --bag: write its log into this new file")
     parser.add_argument(

@@ -9,8 +9,8 @@ from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.bag.formation_bag import FormationBag
+from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.bag.reader import Bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.components.base import Component, Place

@@ -41,7 +41,7 @@ ARGUMENTS = {
     "namespace": Argument("", "namespace of the formation, below the one that was pushed; empty: none of its own"),
     "bag": Argument("", "folder of the bag, which must not exist; empty: nothing is recorded"),
     "images": Argument("false", "record pictures too", _SWITCH),
-    "rviz": Argument("false", "show the run in RViz, where rviz2 is installed; closing it doesn't end the run", _SWITCH),
+    "rviz": Argument("false", "show the run in RViz, which must be installed; closing it doesn't end the run", _SWITCH),
     "discovery_range": Argument(
         "",
         f"who may find the nodes; empty: what {DISCOVERY} says, else LOCALHOST",

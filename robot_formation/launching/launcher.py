@@ -33,7 +33,11 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
 RECORDER_PATIENCE_S = (10.0, 5.0)
 """How long the recorder may take after SIGINT and after SIGTERM, s."""
-_RECORDER_STOP_SIGNALS = (*zip((signal.SIGINT, signal.SIGTERM), RECORDER_PATIENCE_S, strict=True), (signal.SIGKILL, 1.0))
+_RECORDER_STOP_SIGNALS = (
+    (signal.SIGINT, RECORDER_PATIENCE_S[0]),
+    (signal.SIGTERM, RECORDER_PATIENCE_S[1]),
+    (signal.SIGKILL, 1.0),
+)
 
 
 def _clean_shared_memory(domain: int) -> None:

@@ -63,7 +63,8 @@ def processes(
         }
         found.append(Process(RECORDER, namespace, parameters))
     for kind, robot in scenario.hosts():
-        found.append(Process(kind.name, _inside(namespace, robot), {**scenario.robot_parameters(kind.name, robot), **host}))
+        values = {**scenario.robot_parameters(kind.name, robot), **host}
+        found.append(Process(kind.name, _inside(namespace, robot), values))
     return found
 
 

@@ -42,15 +42,11 @@ class Executable:
         self._node = node
         self._messages = 0
         began = time.monotonic()
-        self._progress = Progress(
-            parameters.followers, parameters.timesteps, _say, lambda: time.monotonic() - began
-        )
+        self._progress = Progress(parameters.followers, parameters.timesteps, _say, lambda: time.monotonic() - began)
         for name in self._progress.topics:
             topic = topic_of(name)
-            # In the node's own namespace: the formation's.
-            node.create_subscription(
-                conversions.message_class(topic.type), name.lstrip("/"), partial(self._take, name), qos_profile(topic.qos)
-            )
+            message_class, inside = conversions.message_class(topic.type), name.lstrip("/")
+            node.create_subscription(message_class, inside, partial(self._take, name), qos_profile(topic.qos))
 
     def run(self) -> int:
         """Follow the run; return the exit code."""
