@@ -61,8 +61,8 @@ class RecorderParameters:
     )
     own_namespace: bool = parameter(
         False,
-        "Record only what lies in the recorder's own namespace or 'topics' names, and of /diagnostics what is said of the "
-        "nodes there",
+        "Record only what lies in the recorder's own namespace or 'topics' names, and of /diagnostics what is said of "
+        "the nodes there",
     )
     time: str = parameter(
         "simulated",
