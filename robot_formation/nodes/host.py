@@ -139,17 +139,7 @@ class Host:
             self._publishers[topic] = publisher
             self._outbox.add(topic, publisher)
         for entry in self._component.inputs():
-            topic, handler = entry.topic, self._heard(self._delayed(entry.handler))
-            # Volatile: a node that joins late must not act on what was said before.
-            qos = qos_profile(replace(topic.qos, durability="volatile"))
-            # A camera's driver may be best effort: its user may ask for less.
-            options = QoSOverridingOptions.with_default_policies() if topic.type == names.IMAGE_TYPE else None
-            try:
-                node.create_subscription(
-                    conversions.message_class(topic.type), topic.name, handler, qos, qos_overriding_options=options
-                )
-            except RuntimeError as error:  # rclpy's own, for an override that is no value of its policy
-                raise FormationError(f"{node.get_fully_qualified_name()}: {error}") from None
+            self._subscribe(entry.topic, self._heard(self._delayed(entry.handler)))
         refuse_unused_overrides(node)
         for name, service in self._component.services().items():
             node.create_service(Trigger, name, partial(_trigger, service))
@@ -163,6 +153,17 @@ class Host:
         node.create_timer(_DIAGNOSTICS_S, self._publish_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
         if self._component.patience_s > 0.0:
             node.create_timer(_DIAGNOSTICS_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _subscribe(self, topic: names.Topic, handler: Callable[[Any], None]) -> None:
+        message_class = conversions.message_class(topic.type)
+        # Volatile: a node that joins late must not act on what was said before.
+        qos = qos_profile(replace(topic.qos, durability="volatile"))
+        # A camera's driver may be best effort: its user may ask for less.
+        options = QoSOverridingOptions.with_default_policies() if topic.type == names.IMAGE_TYPE else None
+        try:
+            self._node.create_subscription(message_class, topic.name, handler, qos, qos_overriding_options=options)
+        except RuntimeError as error:  # rclpy's own, for an override that is no value of its policy
+            raise FormationError(f"{self._node.get_fully_qualified_name()}: {error}") from None
 
     def run(self) -> int:
         """Spin until the component finishes or a signal comes; then make sure that everything sent has arrived."""
