@@ -348,5 +348,5 @@ def test_the_value_of_an_option_may_be_a_text():
 
 @pytest.mark.parametrize("setting", ["sed=3", "predicter.name=x", "predictor.nam=x", "seed", "seed=[1", "seed=x"])
 def test_a_wrong_setting_names_where_it_was_written(setting):
-    with pytest.raises(FormationError, match="^set:="):
+    with pytest.raises(FormationError, match=r"^set:="):
         override(load_track("one"), [setting], source="set:=")
