@@ -15,6 +15,7 @@ NODES = (
     "overhead_tracker",
     "recorder",
     "player",
+    "progress",
 )
 
 

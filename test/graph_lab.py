@@ -16,8 +16,8 @@ from std_srvs.srv import Trigger
 
 from robot_formation import conversions
 from robot_formation.experiment.domain import DomainReservation
-from robot_formation.experiment.in_process import absolute
 from robot_formation.launching.environment import node_environment
+from robot_formation.names import absolute
 from robot_formation.nodes.host import qos_profile
 
 DEADLINE_S = 90.0  # long enough for a machine that others keep busy

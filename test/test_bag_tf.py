@@ -166,3 +166,13 @@ def test_a_topic_of_the_recorders_own_keeps_its_type(tmp_path):
     with pytest.raises(BagError, match="added before"):
         recorder.add_topic("/tf", STRING, TopicQos())
     recorder.close()
+
+
+def test_each_formations_transforms_lie_in_its_namespace():
+    made = Transforms()
+    for namespace, x in (("", 0.1), ("/site_a", 0.2)):
+        message = odometry(0, x, 0.2, 0.3)
+        message.child_frame_id = "leader/base_link"
+        made.take(f"{namespace}/ground_truth/leader/odom", ODOMETRY, cdr(message), 0)
+    places = {name: message.transforms[0].transform.translation.x for name, message, _ in decoded(made.make())}
+    assert places == {"/tf": 0.1, "/site_a/tf": 0.2, "/tf_static": 0.1, "/site_a/tf_static": 0.2}

@@ -16,7 +16,8 @@ from robot_formation import names
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
-from robot_formation.bag.reader import Bag, read_bag
+from robot_formation.bag.formation_bag import FormationBag
+from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.control.motion import Motion
 from robot_formation.parameters import suggestion
@@ -26,18 +27,22 @@ _LOGGED = (names.DISPLACEMENT, names.RESIDUAL, names.COMMANDED)
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
 
 
-def load_run(path: str | Path) -> RunRecord:
+def load_run(path: str | Path, namespace: str | None = None) -> RunRecord:
     """Read a run's bag, finished or not.
 
+    Args:
+        path: the bag.
+        namespace: where the formation lies in it, '/' for the root; None: wherever there is one.
+
     Raises:
-        BagError: the bag is missing, no bag, empty or corrupted.
+        BagError: the bag is missing, no bag, empty or corrupted, or holds several formations.
         AnalysisError: the bag has no run of a formation.
     """
     with read_bag(path) as bag:
-        return run_record(bag)
+        return run_record(FormationBag(bag, namespace))
 
 
-def run_record(bag: Bag) -> RunRecord:
+def run_record(bag: FormationBag) -> RunRecord:
     """Take a run's record out of an open bag.
 
     Raises:
@@ -71,8 +76,8 @@ def record_of(
     """
     messages = defaultdict(list, messages)
     stamps = defaultdict(list, stamps or {})
-    markers = messages[_absolute(names.SURFACE.name)]
-    tracks = {robot: _track(messages[_absolute(names.ground_truth_odom(robot).name)]) for robot in robots}
+    markers = messages[names.absolute("", names.SURFACE.name)]
+    tracks = {robot: _track(messages[names.absolute("", names.ground_truth_odom(robot).name)]) for robot in robots}
     record = RunRecord(
         leader_moved=_stamped(messages[f"/{names.LEADER}/{names.MOVED.name}"]),
         followers=tuple(_follower(robot, messages, stamps) for robot in robots if robot != names.LEADER),
@@ -80,19 +85,26 @@ def record_of(
         simulated_s=_last_stamp_ns(messages) / 1e9,
         details=details,
         ground=_ground(markers[-1]) if markers else None,
-        left_plate=tuple(message.data for message in messages[_absolute(names.left_plate().name)]),
+        left_plate=tuple(message.data for message in messages[names.absolute("", names.left_plate().name)]),
     )
     return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
 
 
-def load_displacements(path: str | Path, robot: str) -> DisplacementLog:
+def load_displacements(path: str | Path, robot: str, namespace: str | None = None) -> DisplacementLog:
     """Read a robot's displacements, residuals and commands, as its predictor got them: paired by their stamps.
 
+    Args:
+        path: the bag.
+        robot: the robot's name.
+        namespace: where its formation lies in the bag, '/' for the root; None: wherever there is one.
+
     Raises:
-        BagError: the bag is missing, no bag, empty or corrupted, or a topic has another message type than a run's.
+        BagError: the bag is missing, no bag, empty or corrupted, it holds several formations, or a topic has another
+            message type than a run's.
         AnalysisError: the bag has no displacements of this robot.
     """
-    with read_bag(path) as bag:
+    with read_bag(path) as opened:
+        bag = FormationBag(opened, namespace)
         topics = {f"/{robot}/{topic.name}": topic.type for topic in _LOGGED}
         _require_displacements(bag, robot)
         bag.require({topic: type_name for topic, type_name in topics.items() if topic in bag.topics})
@@ -110,7 +122,7 @@ def load_displacements(path: str | Path, robot: str) -> DisplacementLog:
     return DisplacementLog(str(path), tuple(f"timestep {t}" for t in range(1, len(stamps) + 1)), *columns)
 
 
-def _require_displacements(bag: Bag, robot: str) -> None:
+def _require_displacements(bag: FormationBag, robot: str) -> None:
     pattern = re.compile(rf"/([^/]+)/{names.DISPLACEMENT.name}")
     robots = [match[1] for topic in bag.topics if (match := pattern.fullmatch(topic))]
     if not robots:
@@ -129,7 +141,7 @@ def _last_stamp_ns(messages: Mapping[str, Sequence[Any]]) -> int:
     )
 
 
-def _robots(bag: Bag) -> list[str]:
+def _robots(bag: FormationBag) -> list[str]:
     """Find the robots by their topics: the leader, then the followers by number."""
     topics = "|".join(topic.name for topic in (*_MOTIONS, names.ALIGNMENT))
     found = {match[1] for topic in bag.topics if (match := re.fullmatch(rf"/follower_([1-9]\d*)/(?:{topics})", topic))}
@@ -143,16 +155,15 @@ def _robots(bag: Bag) -> list[str]:
 
 def run_topics(robots: Sequence[str]) -> dict[str, str]:
     """Name the topics that the analysis reads, with their message types."""
-    topics = {_absolute(topic.name): topic.type for topic in (names.SURFACE, names.left_plate(), names.OVERHEAD_POSES)}
+    topics = {
+        names.absolute("", topic.name): topic.type
+        for topic in (names.SURFACE, names.left_plate(), names.OVERHEAD_POSES)
+    }
     for robot in robots:
         odom = names.ground_truth_odom(robot)
-        topics[_absolute(odom.name)] = odom.type
+        topics[names.absolute("", odom.name)] = odom.type
         topics.update({f"/{robot}/{topic.name}": topic.type for topic in (*_MOTIONS, names.MOVE, names.ALIGNMENT)})
     return topics
-
-
-def _absolute(name: str) -> str:
-    return name if name.startswith("/") else f"/{name}"
 
 
 def _follower(robot: str, messages: Mapping[str, Sequence[Any]], stamps: Mapping[str, Sequence[int]]) -> FollowerRecord:
@@ -220,11 +231,11 @@ def _overhead(
     The tracker tells the places of all robots after each picture, in their order. One that it doesn't see keeps its
     place to the last bit; one that it sees never does, since pictures are noisy.
     """
-    told = sorted(messages[_absolute(names.OVERHEAD_POSES.name)], key=_stamp_ns)
+    told = sorted(messages[names.absolute("", names.OVERHEAD_POSES.name)], key=_stamp_ns)
     told = [message for message in told if len(message.poses) == len(robots)]
     tracks = {}
     for number, robot in enumerate(robots):
-        truth = messages[_absolute(names.ground_truth_odom(robot).name)]
+        truth = messages[names.absolute("", names.ground_truth_odom(robot).name)]
         if not told or not truth:
             continue
         places = np.array([_place(message.poses[number].position) for message in told])

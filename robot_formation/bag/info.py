@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_formation.bag.folder import storage_files
+from robot_formation.bag.formation_bag import formation_namespaces
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
@@ -115,6 +116,9 @@ def info_text(info: BagInfo) -> str:
         *((key, info.details[key]) for key in _DETAILS if info.details.get(key)),
     ]
     facts += [("Warning", warning) for warning in info.warnings]
+    formations = formation_namespaces(topic.name for topic in info.topics if topic.message_count)
+    if any(formations):
+        facts.append(("Formations in", ", ".join(namespace or "/" for namespace in formations)))
     if not info.closed:
         facts.insert(0, ("Not closed", f"figures of what 'formation recover {info.path}' would save"))
     lines = []

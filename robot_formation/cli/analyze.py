@@ -21,6 +21,9 @@ def add_parser(subparsers: Any) -> None:
         "--json", action="store_true", help="print JSON and nothing else; pictures are drawn only if --out is given"
     )
     parser.add_argument("--no-pictures", action="store_true", help="draw no pictures")
+    parser.add_argument(
+        "--namespace", metavar="NS", help="the formation's namespace, where the bag holds several formations"
+    )
     parser.set_defaults(run=run)
 
 
@@ -36,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from robot_formation.analysis.quantities import analyse
     from robot_formation.analysis.report import pictures_folder, text_report, to_json, write_pictures
 
-    record = load_run(args.bag)
+    record = load_run(args.bag, args.namespace)
     analysis = analyse(record)
     if not args.json:
         print(text_report(record, analysis))

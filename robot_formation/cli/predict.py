@@ -37,6 +37,11 @@ def add_parser(subparsers: Any) -> None:
     source.add_argument("log", metavar="LOG.csv", type=Path, nargs="?", help="displacement log")
     source.add_argument("--bag", metavar="BAG", type=Path, help="take the log out of a recorded run instead")
     parser.add_argument("--robot", metavar="NAME", help=f"with --bag: whose log (default: {names.follower(1)})")
+    parser.add_argument(
+        "--namespace",
+        metavar="NS",
+        help="with --bag: the formation's namespace, where the bag holds several formations",
+    )
     parser.add_argument("--out", metavar="LOG.csv", type=Path, help="with --bag: write its log into this new file")
     parser.add_argument(
         "--predictors",
@@ -132,14 +137,14 @@ def read(args: argparse.Namespace) -> DisplacementLog:
     from robot_formation.analysis.displacement_log import read_log, write_log
 
     if args.bag is None:
-        for option in ("robot", "out"):
+        for option in ("robot", "namespace", "out"):
             if getattr(args, option) is not None:
                 raise FormationError(f"--{option} belongs to --bag; leave it out, or give a bag instead of a log")
         return read_log(args.log)
     # Imported here, so that a log doesn't pay for rosbags.
     from robot_formation.analysis.from_bag import load_displacements
 
-    log = load_displacements(args.bag, args.robot or names.follower(1))
+    log = load_displacements(args.bag, args.robot or names.follower(1), args.namespace)
     if args.out is not None:
         write_log(log, args.out)
     return log

@@ -43,6 +43,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="a parameter of that node; may be repeated"
     )
+    parser.add_argument(
+        "--namespace", metavar="NS", help="the formation's namespace, where the bag holds several formations"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON and nothing else on standard output")
     parser.set_defaults(run=run)
 
@@ -61,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     if args.predictor is not None:
         changes["name"] = args.predictor
     with read_bag(args.bag) as bag:
-        recording = Recording(bag)
+        recording = Recording(bag, args.namespace)
         data, text = _REPLAYS[kind](recording, changes)
     for note in recording.notes:
         print(f"note: {note}", file=sys.stderr)

@@ -130,7 +130,7 @@ def _odometry(pose: Pose, robot: str, stamp_ns: int) -> Any:
 
 
 def _record(recorder: Recorder, namespace: str, topic: names.Topic, message: Any) -> None:
-    name = f"/{names.under(namespace, topic.name)}"
+    name = names.absolute(f"/{namespace}", topic.name)
     if name not in recorder.topics:
         q = topic.qos
         recorder.add_topic(name, topic.type, TopicQos(q.history, q.depth, q.reliability, q.durability))

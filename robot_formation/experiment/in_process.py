@@ -24,7 +24,7 @@ from robot_formation.components.catalogue import NodeKind
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
-from robot_formation.names import IMAGE_TYPE, Topic
+from robot_formation.names import IMAGE_TYPE, Topic, absolute
 from robot_formation.parameters import from_mapping
 
 
@@ -123,11 +123,6 @@ class InProcessRun:
             qos = topic.qos
             recorder.add_topic(name, topic.type, TopicQos(qos.history, qos.depth, qos.reliability, qos.durability))
         recorder.record(name, topic.type, conversions.to_cdr(message))
-
-
-def absolute(namespace: str, name: str) -> str:
-    """Resolve a topic name as ROS does: absolute ones stay, relative ones lie in the namespace."""
-    return name if name.startswith("/") else f"{namespace}/{name}"
 
 
 def run_in_process(

@@ -9,6 +9,7 @@ from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.bag.reader import Bag
 from robot_formation.bag.recorder import METADATA_NAME
@@ -26,8 +27,13 @@ class Recording:
         notes: what a reader should know: parameters and versions that were other ones.
     """
 
-    def __init__(self, bag: Bag) -> None:
-        self._bag = bag
+    def __init__(self, opened: Bag, namespace: str | None = None) -> None:
+        """Choose the run's formation: the one in this namespace ('/': the root), None: wherever there is one.
+
+        Raises:
+            BagError: there is none, or there are several to choose from.
+        """
+        bag = self._bag = FormationBag(opened, namespace)
         numbers = {int(match[1]) for topic in bag.topics if (match := re.match(r"/follower_([1-9]\d*)/", topic))}
         self.followers = [names.follower(number) for number in sorted(numbers)]
         if not self.followers:
@@ -82,7 +88,7 @@ class Recording:
 
 def absolute(robot: str, topic: names.Topic) -> str:
     """Name a robot's topic in full."""
-    return topic.name if topic.name.startswith("/") else f"/{robot}/{topic.name}"
+    return names.absolute(f"/{robot}", topic.name)
 
 
 def host(kind: str, parameters: Any, robot: str, notes: list[str]) -> tuple[Component, list[tuple[str, Any]]]:

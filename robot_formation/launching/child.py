@@ -14,6 +14,7 @@ from pathlib import Path
 import yaml
 
 from robot_formation.experiment.run_result import NodeUsage
+from robot_formation.launching.outcome import manner
 from robot_formation.launching.processes import Process
 
 _PR_SET_PDEATHSIG = 1
@@ -74,7 +75,7 @@ class Child:
     def death(self) -> str:
         """Say how it ended."""
         code = self.exit_code or 0
-        how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        how = manner(code)
         lines = self._text().strip().splitlines()
         match = _LOG_LINE.match(lines[-1]) if lines else None
         last = "" if match and match["level"] == "INFO" else self.last_words()  # that it was ready is no reason

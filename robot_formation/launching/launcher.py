@@ -23,6 +23,7 @@ from robot_formation.experiment.scenario import Scenario
 from robot_formation.experiment.shared_memory import clean_orphans, fast_dds_files, is_of_domain
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
+from robot_formation.launching.outcome import verdict
 from robot_formation.launching.processes import RECORDER, processes
 
 _POLL_S = 0.05
@@ -30,7 +31,13 @@ _CLEANING_ROUNDS = 6
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
-_RECORDER_STOP_SIGNALS = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 1.0))
+RECORDER_PATIENCE_S = (10.0, 5.0)
+"""How long the recorder may take after SIGINT and after SIGTERM, s."""
+_RECORDER_STOP_SIGNALS = (
+    (signal.SIGINT, RECORDER_PATIENCE_S[0]),
+    (signal.SIGTERM, RECORDER_PATIENCE_S[1]),
+    (signal.SIGKILL, 1.0),
+)
 
 
 def _clean_shared_memory(domain: int) -> None:
@@ -135,11 +142,11 @@ class Launcher:
                     return exit_codes.NODE_DIED, f"no node has shown a sign of life for {silence_s:.0f} s"
 
     def _verdict(self, ended: Child) -> tuple[int, str]:
-        code, executable = ended.exit_code, ended.process.executable
-        if code == 0 and executable == "leader":
-            return exit_codes.DONE, ""
-        if code == exit_codes.LOST and executable in ("fine_tuner", "world"):
-            return exit_codes.LOST, ended.last_words()
+        code = verdict(ended.process.executable, ended.exit_code or 0)
+        if code == exit_codes.DONE:
+            return code, ""
+        if code == exit_codes.LOST:
+            return code, ended.last_words()
         if code == exit_codes.BAD_INPUT:
             raise RunError(f"{ended.name}: {ended.last_words()}")
         return exit_codes.NODE_DIED, f"node {ended.name} {ended.death}"

@@ -18,6 +18,7 @@ from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool, Trigger
 
@@ -28,8 +29,16 @@ from robot_formation.errors import FormationError
 from robot_formation.loopback import use_loopback
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.help import help_text
+from robot_formation.nodes.live_transforms import LiveTransforms, transform_topics
 from robot_formation.nodes.outbox import Outbox
-from robot_formation.nodes.parameters import AT_START, HostParameters, ParameterNode, declare, take_changes
+from robot_formation.nodes.parameters import (
+    AT_START,
+    HostParameters,
+    ParameterNode,
+    declare,
+    refuse_unused_overrides,
+    take_changes,
+)
 from robot_formation.nodes.repetition import Repetitions
 from robot_formation.nodes.signals import ignore_signals, stopped
 from robot_formation.parameters import specs
@@ -117,7 +126,8 @@ class Host:
             raise FormationError(
                 f"{kind}: it belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1"
             )
-        place = Place(robot if entry.robots else "", self._parameters.formation)
+        home = node.get_namespace().rpartition("/")[0] if entry.robots else node.get_namespace()
+        place = Place(robot if entry.robots else "", names.absolute(home, self._parameters.formation_namespace))
         self._pacer = Pacer(getattr(parameters, "real_time_factor", 0.0))
         self._component: Component = component_class(parameters, place)
         self._component.wall_clock = time.perf_counter
@@ -125,12 +135,14 @@ class Host:
         self._outbox = Outbox(
             node,
             patience_s=self._parameters.wait_for_listeners_s,
-            recorder=self._parameters.recorder,
+            recorder=names.absolute(home, self._parameters.recorder) if self._parameters.recorder else "",
             record_images=self._parameters.record_images,
             warn=self._component.warn,
         )
-        self._component.attach(self._outbox.send, self._say)
+        self._component.attach(self._send, self._say)
         self._repetitions = Repetitions()
+        self._transform_topics = transform_topics() if kind == "world" else []
+        self._transforms = LiveTransforms(node.get_namespace()) if self._transform_topics else None
         self._delays = random.Random(os.getpid())
         self._publishers: dict[names.Topic, Any] = {}
         self._heard_s = time.monotonic()
@@ -138,15 +150,13 @@ class Host:
 
     def _connect(self) -> None:
         node = self._node
-        for topic in self._component.outputs():
+        for topic in [*self._component.outputs(), *self._transform_topics]:
             publisher = node.create_publisher(conversions.message_class(topic.type), topic.name, qos_profile(topic.qos))
             self._publishers[topic] = publisher
             self._outbox.add(topic, publisher)
         for entry in self._component.inputs():
-            topic, handler = entry.topic, self._heard(self._delayed(entry.handler))
-            # Volatile: a node that joins late must not act on what was said before.
-            qos = qos_profile(replace(topic.qos, durability="volatile"))
-            node.create_subscription(conversions.message_class(topic.type), topic.name, handler, qos)
+            self._subscribe(entry.topic, self._heard(self._delayed(entry.handler)))
+        refuse_unused_overrides(node)
         for name, service in self._component.services().items():
             node.create_service(Trigger, name, partial(_trigger, service))
         for name, switch in self._component.switches().items():
@@ -159,6 +169,17 @@ class Host:
         node.create_timer(_DIAGNOSTICS_S, self._publish_health, clock=Clock(clock_type=ClockType.STEADY_TIME))
         if self._component.patience_s > 0.0:
             node.create_timer(_DIAGNOSTICS_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _subscribe(self, topic: names.Topic, handler: Callable[[Any], None]) -> None:
+        message_class = conversions.message_class(topic.type)
+        # Volatile: a node that joins late must not act on what was said before.
+        qos = qos_profile(replace(topic.qos, durability="volatile"))
+        # A camera's driver may be best effort: its user may ask for less.
+        options = QoSOverridingOptions.with_default_policies() if topic.type == names.IMAGE_TYPE else None
+        try:
+            self._node.create_subscription(message_class, topic.name, handler, qos, qos_overriding_options=options)
+        except RuntimeError as error:  # rclpy's own, for an override that is no value of its policy
+            raise FormationError(f"{self._node.get_fully_qualified_name()}: {error}") from None
 
     def run(self) -> int:
         """Spin until the component finishes or a signal comes; then make sure that everything sent has arrived."""
@@ -186,6 +207,13 @@ class Host:
             executor.shutdown()
             component.close()
         return component.exit_code or 0
+
+    def _send(self, topic: names.Topic, message: Any) -> None:
+        # Transforms first: a recorder that gets the message has found their topics, and makes none of its own.
+        if self._transforms is not None:
+            for name, cdr in self._transforms.of(topic, message):
+                self._outbox.send(name, cdr)
+        self._outbox.send(topic, message)
 
     def _heard(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
         def noted(message: Any) -> None:

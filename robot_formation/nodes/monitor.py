@@ -46,6 +46,12 @@ def _set(values: Mapping[str, str | None]) -> None:
             os.environ[name] = value
 
 
+def topic_of(name: str) -> names.Topic:
+    """Tell type and quality of service of a topic that `Progress` wants."""
+    types = {topic.name: topic for topic in (names.MOVED, names.ALIGNMENT, names.DISPLACEMENT)}
+    return types.get(name.rpartition("/")[2]) or names.ground_truth_pose("")
+
+
 class Monitor:
     """Listens to topics of a domain; a context manager. `spin` takes what has arrived."""
 
@@ -67,9 +73,8 @@ class Monitor:
         self._executor.add_node(self._node)
         self._listen = listen
         self.messages = 0
-        types = {topic.name: topic for topic in (names.MOVED, names.ALIGNMENT, names.DISPLACEMENT)}
         for name in topics:
-            topic = types.get(name.rpartition("/")[2]) or names.ground_truth_pose("")
+            topic = topic_of(name)
             message_class = conversions.message_class(topic.type)
             self._node.create_subscription(message_class, name, partial(self._take, name), qos_profile(topic.qos))
 

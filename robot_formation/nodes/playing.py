@@ -135,7 +135,7 @@ class PlayerNode:
         self._executor.add_node(node)
 
     def _make_clock(self) -> Publisher:
-        topic = names.CLOCK_TOPIC
+        topic = names.ROS_CLOCK
         return self._node.create_publisher(conversions.message_class(topic.type), topic.name, qos_profile(topic.qos))
 
     def _prepare(self) -> Excerpt:
@@ -149,7 +149,7 @@ class PlayerNode:
         for name, topic in contents.items():
             if not selection.wants(name, topic.type_name):
                 continue
-            if p.clock_hz > 0.0 and name == names.CLOCK_TOPIC.name:
+            if p.clock_hz > 0.0 and name == names.ROS_CLOCK.name:
                 continue
             self._open(topic, remaps.get(name, name))
         if not self._outputs:

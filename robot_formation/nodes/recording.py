@@ -36,7 +36,8 @@ from robot_formation.parameters import ParameterError, parameter
 _DISCOVERY_S = 0.05
 _REVIEW_S = 1.0
 _TICK_TYPE = "std_msgs/msg/UInt32"
-_MADE_HERE = {topic.name: topic.type for topic in (names.TF, names.TF_STATIC)}  # by the bag's recorder, of true poses
+# By their names' last parts: what the bag's recorder makes of true poses, in every formation's namespace.
+_MADE_HERE = {topic.name.lstrip("/"): topic.type for topic in (names.TF, names.TF_STATIC)}
 _AFTER_TICK_S = 0.01  # what belongs to a timestep arrives well within this after its tick
 _IDLE_S = 0.05
 _OLDEST_CHUNK_S = 1.0
@@ -59,6 +60,11 @@ class RecorderParameters:
     images: bool = parameter(
         False, "Record pictures too where 'topics' doesn't name them: noisy frames are 126 MB per thousand"
     )
+    own_namespace: bool = parameter(
+        False,
+        "Record only what lies in the recorder's own namespace or 'topics' names, and of /diagnostics what is said of "
+        "the nodes there",
+    )
     time: str = parameter(
         "simulated",
         "Log times: a message's own stamp or the latest one before it (simulated), or the wall clock (receive)",
@@ -78,13 +84,15 @@ class RecorderParameters:
     )  # fmt: skip
     metadata: tuple[str, ...] = parameter((), "Texts 'key=value' for the bag's metadata record")
 
-    def selection(self, resolve: Callable[[str], str]) -> Selection:
-        """Say which topics are meant; `resolve` makes names absolute.
+    def selection(self, resolve: Callable[[str], str], namespace: str) -> Selection:
+        """Say which topics are meant; `resolve` makes names absolute, `namespace` is the recorder's.
 
         Raises:
             BagError: a regular expression is none.
         """
-        return Selection(tuple(resolve(topic) for topic in self.topics), self.regex, self.exclude, self.images)
+        within = namespace.rstrip("/") if self.own_namespace else ""
+        topics = tuple(resolve(topic) for topic in self.topics)
+        return Selection(topics, self.regex, self.exclude, self.images, within)
 
     def write_options(self) -> WriteOptions:
         """Say how the files are written."""
@@ -143,7 +151,7 @@ class RecorderNode:
             raise ParameterError("say where the bag goes, with the parameter 'path'")
         self._node, self._parameters, self._say = node, parameters, say
         self._warn: Callable[[str], None] = warn or (lambda text: node.get_logger().warning(text))
-        self._selection = parameters.selection(node.resolve_topic_name)
+        self._selection = parameters.selection(node.resolve_topic_name, node.get_namespace())
         self._recorder = Recorder(Path(parameters.path), parameters.texts(), parameters.write_options())
         self._queue = RecordingQueue(self._recorder, parameters.queue_bytes)
         self._receive_time = parameters.time == "receive"
@@ -225,9 +233,10 @@ class RecorderNode:
 
     def _subscribe(self, name: str, types: list[str], infos: list[TopicEndpointInfo]) -> None:
         type_name = types[0]
-        if type_name != _MADE_HERE.get(name, type_name):
+        made = _MADE_HERE.get(name.rpartition("/")[2], type_name)
+        if type_name != made:
             self._ignored.add(name)
-            self._warn(f"{name} is not recorded: its type is {type_name} instead of {_MADE_HERE[name]}")
+            self._warn(f"{name} is not recorded: its type is {type_name} instead of {made}")
             return
         try:
             message_class: Any = conversions.message_class(type_name)
@@ -247,7 +256,7 @@ class RecorderNode:
         self._say(f"recording {name} ({type_name})")
 
     def _on_message(self, topic: str, type_name: str, data: bytes) -> None:
-        if self._health.is_own(topic, data):
+        if self._health.is_own(topic, data) or self._is_of_others(topic, data):
             return
         self._messages += 1
         self._queue.put(topic, type_name, data, time.time_ns() if self._receive_time else None)
@@ -257,6 +266,14 @@ class RecorderNode:
     @property
     def _lost(self) -> Counter[str]:
         return Counter({topic: intake.lost for topic, intake in self._subscribed.items() if intake.lost})
+
+    def _is_of_others(self, topic: str, data: bytes) -> bool:
+        """Tell whether a message on the one topic that all formations share says nothing of this one's nodes."""
+        namespace = self._selection.namespace
+        if not namespace or topic != names.DIAGNOSTICS.name or topic in self._selection.topics:
+            return False
+        reports = conversions.from_cdr(data, names.DIAGNOSTICS.type).status
+        return not any(report.name.startswith(f"{namespace}/") for report in reports)
 
     def _keep(self, key: str, text: str) -> None:
         self._queue.call(partial(self._recorder.write_metadata, {key: text}))
