@@ -64,7 +64,9 @@ def told(messages, followers, timesteps, order):
     matches = [LINE.fullmatch(line) for line in lines]
     assert all(matches)
     assert {match["n"] for match in matches} == {str(timesteps)}
-    rows = [((match["robot"] or "follower_1", int(match["t"])), (match["correction"], match["error"])) for match in matches]
+    rows = [
+        ((match["robot"] or "follower_1", int(match["t"])), (match["correction"], match["error"])) for match in matches
+    ]
     assert len(rows) == followers * timesteps
     return rows
 

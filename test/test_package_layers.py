@@ -10,7 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "robot_formation"
 
 LAYERS = [
-    {"", "errors", "exit_codes", "names", "parameters", "paths", "tags"},
+    {"", "errors", "exit_codes", "names", "parameters", "paths", "shared_memory_space", "tags"},
     {"surface"},
     {"world"},
     {"control", "koopman", "vision"},

@@ -31,7 +31,9 @@ class _Heard:
 
     def moves_between(self, after_ns: int, until_ns: int) -> list[tuple[int, Motion]]:
         """List the moves that ended in (after, until]."""
-        return self.moves[bisect_right(self.moves, after_ns, key=_stamp) : bisect_right(self.moves, until_ns, key=_stamp)]
+        return self.moves[
+            bisect_right(self.moves, after_ns, key=_stamp) : bisect_right(self.moves, until_ns, key=_stamp)
+        ]
 
     def timestep_moves(self, timestep: int, after_ns: int) -> list[Motion] | None:
         """List the moves of a finished timestep, counted from 1, that began after a stamp; None until all are there."""

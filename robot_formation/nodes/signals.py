@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import signal
+import sys
 from typing import Any
+
+from robot_formation import exit_codes
+from robot_formation.shared_memory_space import SharedMemoryError, require_space
 
 _stop = False
 
 
 def stop_on_signals() -> None:
-    """Let SIGINT and SIGTERM set a flag that the main loops look at."""
+    """Let SIGINT and SIGTERM set a flag that the main loops look at. Ends the process where ROS can't be loaded."""
 
     def handler(number: int, frame: Any) -> None:
         global _stop
@@ -17,6 +21,11 @@ def stop_on_signals() -> None:
 
     signal.signal(signal.SIGINT, handler)
     signal.signal(signal.SIGTERM, handler)
+    try:
+        require_space()
+    except SharedMemoryError as error:
+        print(error, file=sys.stderr)
+        raise SystemExit(exit_codes.BAD_INPUT) from None
 
 
 def stopped() -> bool:
