@@ -82,6 +82,11 @@ def run(args: argparse.Namespace) -> int:
         return result.exit_code
     try:
         report(args, result)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        from robot_formation.cli.main import forget_output
+
+        forget_output()
     except FormationError as error:
         if result.exit_code in (exit_codes.DONE, exit_codes.LOST):
             raise

@@ -17,9 +17,9 @@ _SAME = 1e-6  # metres and radians
 
 @dataclass
 class _Heard:
-    """What was heard of a robot: stamps [ns] with poses, finished moves and timesteps, each in order; and what was said.
+    """What was heard of a robot: stamps [ns] with poses, finished moves and timesteps; and what was said.
 
-    Each topic keeps its order, so these lists are sorted by stamp; between topics there is no order.
+    A topic keeps its order, so these lists are sorted by stamp; between topics there is no order.
     """
 
     poses: list[tuple[int, Motion]] = field(default_factory=list)

@@ -252,9 +252,11 @@ class Pacer:
 
     def worked(self, stamp_ns: int) -> None:
         """Take note of the simulated time reached. Standing still doesn't build up credit to be made good later."""
+        step_ns = stamp_ns - self._simulated_ns
+        self._simulated_ns = stamp_ns
         if self.factor <= 0.0:
+            self._due_s = None
             return
         now = self._clock()
-        step_s = (stamp_ns - self._simulated_ns) * 1e-9 / self.factor
-        self._simulated_ns = stamp_ns
+        step_s = step_ns * 1e-9 / self.factor
         self._due_s = max(now, (self._due_s or now) + step_s)
