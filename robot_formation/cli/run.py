@@ -170,6 +170,9 @@ def report(args: argparse.Namespace, result: RunResult) -> None:
         print(to_json(analysis))
         return
     print(text_report(record, analysis))
+    if result.exit_code == exit_codes.INTERRUPTED:  # whoever interrupts wants to leave
+        print(f"\nbag: {result.bag}\n'formation analyze {result.bag}' makes the pictures")
+        return
     folder = result.bag.with_name(f"{result.bag.name}_analysis")
     pictures = write_pictures(record, analysis, folder)
     print(f"\nbag: {result.bag}\npictures: " + ", ".join(str(picture) for picture in pictures))

@@ -33,7 +33,7 @@ class Watchdog:
         self,
         nodes: Iterable[str],
         *,
-        stopped_s: float = 8.0,
+        stopped_s: float = 6.0,
         silent_s: float = 45.0,
         starting_s: float = 120.0,
         idle_s: float = 90.0,
