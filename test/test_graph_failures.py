@@ -60,6 +60,44 @@ def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path, node):
     assert {group for group in find_orphans(domains[0]) if not group.startswith("fastrtps_port70")} == set()
 
 
+@pytest.mark.parametrize("node", ["/world", "/overhead_tracker", "/follower_1/predictor", "/recorder"])
+def test_a_stopped_node_ends_the_run_by_name_with_a_whole_bag(tmp_path, node):
+    killer = Killer(node, signal.SIGSTOP, after_timesteps=2)
+    result = launch(short_scenario(*LONG), tmp_path / "bag", say=killer.say, on_start=killer.started)
+    assert result.exit_code == 4
+    assert f"node {node} was stopped" in result.reason
+    assert not any(alive(pid) for pid in killer.pids.values())
+    assert len(analyse(load_run(tmp_path / "bag")).followers[0].timesteps) >= 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bag"]
+
+
+@pytest.mark.parametrize("node", ["/overhead_tracker", "/recorder"])
+def test_a_node_stopped_at_the_end_is_named_and_the_bag_is_whole(tmp_path, node):
+    killer = Killer(node, signal.SIGSTOP, after_timesteps=4)
+    result = launch(short_scenario(), tmp_path / "bag", say=killer.say, on_start=killer.started)
+    assert result.exit_code == 4
+    assert f"node {node} was stopped" in result.reason
+    assert len(analyse(load_run(tmp_path / "bag")).followers[0].timesteps) == 4
+
+
+def test_a_launcher_that_was_stopped_for_a_while_goes_on(tmp_path):
+    command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand", "--json"]
+    command += ["--set", "leader.timesteps=4", "--bag", str(tmp_path / "bag")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        for line in process.stderr:
+            if line.startswith("timestep  1/"):
+                break
+        process.send_signal(signal.SIGSTOP)
+        # Its nodes go on: the leader's end is what shows that they have come far enough without it.
+        children = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+        while all(map(alive, children)):
+            os.sched_yield()
+        process.send_signal(signal.SIGCONT)
+        _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert "timestep  4/4" in errors
+
+
 def test_a_lost_leader_ends_the_run_in_good_order(tmp_path):
     result = launch(short_scenario("world.camera.pan_deg=-90.0"), tmp_path / "bag")
     assert result.exit_code == 3

@@ -16,6 +16,7 @@ from typing import Any
 NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _INTERRUPTED = 130
 _IMPATIENT_S = 2.0
+_AGAIN_S = 0.01
 # What writing to a terminal that was closed, or to a stream that nobody reads, is refused with.
 _GONE = ("EIO", "EPIPE", "EBADF", "ENXIO")
 
@@ -58,10 +59,15 @@ class Interrupts:
     def _unraisable(self, unraisable: Any) -> None:
         """Raise an interrupt again that hit where Python can't raise: in a destructor or a callback of C code."""
         if self.came and isinstance(unraisable.exc_value, KeyboardInterrupt):
-            self.came = False
-            signal.raise_signal(signal.SIGINT)
+            # A moment later, since nothing can be raised in here either.
+            signal.signal(signal.SIGALRM, _raise)
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
         else:
             sys.__unraisablehook__(unraisable)
+
+
+def _raise(number: int, frame: Any) -> None:
+    raise KeyboardInterrupt
 
 
 class _Stream(io.FileIO):
