@@ -59,8 +59,9 @@ def run(args: argparse.Namespace) -> int:
             for name, value in values.items():
                 print(f"  {name:<24} {'-' if value is None else value}")
     if missing:
-        hint = "./formation in a checkout installs everything"
-        print(f"formation doctor: a run cannot start: {'; '.join(missing)} ({hint})", file=sys.stderr)
+        installs = any("installed" in text or "imported" in text for text in missing)
+        hint = " (./formation in a checkout installs everything)" if installs else ""
+        print(f"formation doctor: a run cannot start: {'; '.join(missing)}{hint}", file=sys.stderr)
         return 2
     return 0
 

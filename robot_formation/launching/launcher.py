@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 _POLL_S = 0.05
 _REMIND_S = 15.0  # without a line of progress
 _CLEANING_ROUNDS = 6
+_CAUGHT_UP_REPORTS, _CATCH_UP_S = 3, 10.0
 _ORDERLY = (exit_codes.DONE, exit_codes.LOST)
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
@@ -138,8 +139,11 @@ class Launcher:
                 ended = next((child for child in self._children if child.poll() is not None), None)
                 if ended is not None:
                     monitor.drain(_POLL_S, lambda: progress.complete)
-                    return self._verdict(ended)
+                    verdict = self._verdict(ended)
+                    self._resume(monitor)
+                    return verdict
                 if watchdog.due and (reason := self._look(watchdog, monitor)):
+                    self._resume(monitor)
                     return exit_codes.NODE_DIED, reason
                 if time.monotonic() - self._said_at > _REMIND_S:
                     progress.remind()
@@ -147,6 +151,15 @@ class Launcher:
     def _look(self, watchdog: Watchdog, monitor: Monitor) -> str:
         states = {child.name: child.state for child in self._children}
         return watchdog.look(states, monitor.reports, monitor.messages)
+
+    def _resume(self, monitor: Monitor) -> None:
+        """Let stopped nodes go on, so that they end in good order; a recorder first takes what was kept for it."""
+        for child in [child for child in self._children if child.state == STOPPED]:
+            child.signal(signal.SIGCONT)
+            if child.process.executable == RECORDER:
+                enough, end = monitor.reports[child.name] + _CAUGHT_UP_REPORTS, time.monotonic() + _CATCH_UP_S
+                while monitor.reports[child.name] < enough and time.monotonic() < end and not self._interrupted:
+                    monitor.spin(_POLL_S)
 
     def _patience_s(self) -> float:
         factor = self.scenario.parameters("world")["real_time_factor"]
@@ -170,8 +183,6 @@ class Launcher:
 
     def _stop(self) -> None:
         """End all nodes, the recorder last, so that it gets everything that the others still send."""
-        for child in self._children:
-            child.signal(signal.SIGCONT)  # one that was stopped can end in good order too
         recorders = [child for child in self._children if child.process.executable == RECORDER]
         self._end([child for child in self._children if child not in recorders], _STOP_SIGNALS)
         self._end(recorders, _RECORDER_STOP_SIGNALS)
