@@ -143,6 +143,7 @@ class Launcher:
                     self._resume(monitor)
                     return verdict
                 if watchdog.due and (reason := self._look(watchdog, monitor)):
+                    self._tell(f"{reason}; ending the run ...")
                     self._resume(monitor)
                     return exit_codes.NODE_DIED, reason
                 if time.monotonic() - self._said_at > _REMIND_S:
