@@ -75,7 +75,7 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            "formation = robot_formation.cli.main:main",
+            "formation = robot_formation.cli.__main__:main",
             *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
         ]
     },

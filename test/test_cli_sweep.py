@@ -103,7 +103,7 @@ def test_without_out_a_new_folder_in_bags_is_made_each_time(capsys, tmp_path, ma
         assert call(capsys, *CHOICE, "--jobs", 1)[0] == 0
     names = ["sweep_20260101-120000", "sweep_20260101-120000_2", "sweep_20260101-120000_3"]
     assert sorted(path.name for path in (tmp_path / "bags").iterdir()) == names
-    assert default_folder().name == "sweep_20260101-120000_4"
+    assert default_folder().path.name == "sweep_20260101-120000_4"
     assert len(made) == 18
 
 

@@ -126,7 +126,7 @@ def test_each_node_is_an_executable_of_its_name(setup_arguments):
     nodes = {file.stem for file in NODES.glob("*.py") if has_main(file)}
     assert nodes
     assert {f"{node} = robot_formation.nodes.{node}:main" for node in nodes} == set(scripts) - {
-        "formation = robot_formation.cli.main:main"
+        "formation = robot_formation.cli.__main__:main"
     }
 
 

@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parent.parent / "robot_formation"
 LAYERS = [
     {
         *("", "errors", "exit_codes", "files", "loopback", "names", "parameters", "paths", "png_files", "tags"),
-        "yaml_files",
+        *("shared_memory_space", "yaml_files"),
     },
     {"surface"},
     {"world"},

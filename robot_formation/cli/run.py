@@ -15,6 +15,7 @@ from robot_formation.cli.parser import number, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
+    from robot_formation.bag.place import PathReservation
     from robot_formation.experiment.run_result import RunResult
     from robot_formation.experiment.scenario import Scenario
 
@@ -26,7 +27,6 @@ standard error, the analysis to standard output.
 
 
 MOST_WARNINGS = 20
-_TAILS = tuple(f"_{number}" for number in range(2, 1000))  # of bags begun in the same second
 
 
 def add_parser(subparsers: Any) -> None:
@@ -75,8 +75,8 @@ def run(args: argparse.Namespace) -> int:
     tracing = TracingFiles()  # before anything of ROS is loaded
     try:
         scenario = build_scenario(args)
-        bag = args.bag.absolute() if args.bag is not None else default_bag(scenario)
-        result = execute(args, scenario, bag)
+        with reserve(args, scenario) as place:
+            result = execute(args, scenario, place)
     finally:
         tracing.remove_new()
     for warning in result.warnings[:MOST_WARNINGS]:
@@ -88,7 +88,13 @@ def run(args: argparse.Namespace) -> int:
     try:
         if result.bag is not None:
             report(args, result)
+            sys.stdout.flush()
             return result.exit_code
+    except BrokenPipeError:
+        from robot_formation.cli.main import forget_output
+
+        forget_output()
+        return result.exit_code
     except FormationError as error:
         if result.exit_code in (exit_codes.DONE, exit_codes.LOST):
             raise
@@ -124,17 +130,19 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
     return scenario
 
 
-def default_bag(scenario: Scenario) -> Path:
-    """Name a new bag after the run and the time."""
+def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
+    """Reserve the bag's path: as asked for, else a new name after the run and the time."""
+    from robot_formation.bag.place import PathReservation, reserve_new
     from robot_formation.paths import default_bags_dir
 
+    if args.bag is not None:
+        return PathReservation(args.bag)
     predictor = scenario.parameters("predictor")["name"]
     stem = f"{scenario.setup.name}_{predictor}_seed{scenario.setup.seed}_{time.strftime('%Y%m%d-%H%M%S')}"
-    folder, stem = default_bags_dir(), re.sub(r"[^\w.-]", "_", stem)
-    return next(path for path in (folder / f"{stem}{tail}" for tail in ("", *_TAILS)) if not path.exists())
+    return reserve_new(default_bags_dir(), re.sub(r"[^\w.-]", "_", stem))
 
 
-def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResult:
+def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation) -> RunResult:
     """Run the scenario in the way that the options ask for."""
     from robot_formation.experiment.camera_facts import describe_camera
     from robot_formation.experiment.drive_curves import describe_curves
@@ -151,10 +159,12 @@ def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResul
 
         if scenario.parameters("world")["real_time_factor"] > 0.0:
             raise FormationError("--in-process runs as fast as it can; leave --real-time-factor out")
-        return run_in_process(scenario, bag, run_metadata(scenario), images=args.images, say=say)
+        return run_in_process(
+            scenario, place.path, run_metadata(scenario), images=args.images, say=say, reservation=place
+        )
     from robot_formation.launching.launcher import Launcher
 
-    return Launcher(scenario, bag, images=args.images, say=say).run()
+    return Launcher(scenario, place.path, images=args.images, say=say, reservation=place).run()
 
 
 def report(args: argparse.Namespace, result: RunResult) -> None:
@@ -171,6 +181,9 @@ def report(args: argparse.Namespace, result: RunResult) -> None:
         print(to_json(analysis, {**run_facts(record.details, in_process=args.in_process), **_ending(result)}))
         return
     print(text_report(record, analysis))
+    if result.exit_code == exit_codes.INTERRUPTED:  # whoever interrupts wants to leave
+        print(f"\nbag: {result.bag}\n'formation analyze {result.bag}' makes the pictures")
+        return
     folder = result.bag.with_name(f"{result.bag.name}_analysis")
     pictures = write_pictures(record, analysis, folder)
     print(f"\nbag: {result.bag}\npictures: " + ", ".join(str(picture) for picture in pictures))

@@ -17,6 +17,7 @@ from robot_formation.cli.parser import Names, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
+    from robot_formation.bag.place import PathReservation
     from robot_formation.experiment.sweep import Plan
 
 DESCRIPTION = """\
@@ -68,14 +69,22 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments or the folder, before anything is run.
     """
-    from robot_formation.analysis.sweep_summary import summarise, table
     from robot_formation.experiment import sweep
 
     plan = sweep.Plan(args.tracks, args.surfaces, args.predictors, seeds(",".join(args.seeds)), tuple(args.set))
     if args.jobs < 1:
         raise FormationError(f"--jobs is at least 1, not {args.jobs}")
     plan.check()
-    folder = args.out if args.out is not None else default_folder()
+    if args.out is not None:
+        return _sweep(args, plan, args.out)
+    with default_folder() as place:
+        return _sweep(args, plan, place.path)
+
+
+def _sweep(args: argparse.Namespace, plan: sweep.Plan, folder: Path) -> int:
+    from robot_formation.analysis.sweep_summary import summarise, table
+    from robot_formation.experiment import sweep
+
     results = sweep.Table(folder, plan)
     _announce(plan)
     tasks = sweep.remaining(plan, results.rows)
@@ -180,13 +189,12 @@ def _seeds(text: str) -> range:
     return range(first, end)
 
 
-def default_folder() -> Path:
-    """Name a new folder after the time."""
+def default_folder() -> PathReservation:
+    """Name a new folder after the time, and reserve the name."""
+    from robot_formation.bag.place import reserve_new
     from robot_formation.paths import default_bags_dir
 
-    stem = f"sweep_{time.strftime('%Y%m%d-%H%M%S')}"
-    tails = ("", *(f"_{number}" for number in range(2, 1000)))
-    return next(path for path in (default_bags_dir() / f"{stem}{tail}" for tail in tails) if not path.exists())
+    return reserve_new(default_bags_dir(), f"sweep_{time.strftime('%Y%m%d-%H%M%S')}")
 
 
 def with_progress(rows: Iterable[Any], count: int, what: str = "runs") -> Iterator[Any]:

@@ -17,6 +17,7 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.sightings import Sighting
 from robot_formation.experiment.alignment_trial import FOLLOWER
+from robot_formation.experiment.pool import run_parallel
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.experiment.vision_grid import Conditions, Position, measure, stand
 from robot_formation.parameters import from_mapping
@@ -64,11 +65,8 @@ def carry_out(positions: Iterable[Position], conditions: Conditions, jobs: int) 
     Raises:
         CalibrationError: if a worker process dies.
     """
-    from joblib import Parallel, delayed
-
-    pool = Parallel(n_jobs=jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
     try:
-        yield from pool(delayed(measure)(position, conditions) for position in positions)
+        yield from run_parallel(measure, ((position, conditions) for position in positions), jobs)
     except BrokenExecutor:
         raise CalibrationError(
             f"a worker process died (too little memory for --jobs {jobs}?); the same command goes on"

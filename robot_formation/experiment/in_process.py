@@ -132,8 +132,11 @@ def run_in_process(
     *,
     images: bool = False,
     say: Callable[[str], None] = lambda text: None,
+    reservation: PathReservation | None = None,
 ) -> RunResult:
     """Run a scenario, record it if a path is given, and tell its progress to `say`.
+
+    A reservation of the bag's path may have been taken already; it is released at the end.
 
     Raises:
         FormationError: if a component refuses its parameters, or the bag's path is taken or can't be written.
@@ -144,7 +147,7 @@ def run_in_process(
     run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
     with contextlib.ExitStack() as stack:
         if bag is not None:
-            stack.enter_context(PathReservation(bag))
+            stack.enter_context(reservation or PathReservation(bag))
             check_free(bag)
             run.recorder = Recorder(bag, metadata)
             stack.callback(run.recorder.close)

@@ -23,6 +23,7 @@ from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.ideal import IDEAL, IdealRun
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.memory import run_in_memory
+from robot_formation.experiment.pool import run_parallel
 from robot_formation.files import MOST_RECORD_BYTES, check_file, read_file
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.parameters import suggestion
@@ -271,12 +272,8 @@ def carry_out(tasks: Iterable[Task], settings: Sequence[str], jobs: int) -> Iter
     Raises:
         SweepError: if a run can't come to its end, or a worker process dies.
     """
-    from joblib import Parallel, delayed
-
-    # One run in a worker at a time; a few wait, so that no worker idles.
-    pool = Parallel(n_jobs=jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
     try:
-        yield from pool(delayed(run_task)(task, settings) for task in tasks)
+        yield from run_parallel(run_task, ((task, settings) for task in tasks), jobs)
     except BrokenExecutor:
         raise SweepError(f"a worker process died (too little memory for --jobs {jobs}?); {_GOES_ON}") from None
 

@@ -50,6 +50,7 @@ class Child:
                 preexec_fn=_die_with_parent,
             )
         self.exit_code: int | None = None
+        self.forced = False
         self.usage: NodeUsage | None = None
 
     @property
@@ -67,9 +68,24 @@ class Child:
         return self.exit_code
 
     def signal(self, number: signal.Signals) -> None:
-        """Send a signal if the process still runs."""
+        """Send a signal if the process still runs; `forced` tells that it didn't end when it was asked to."""
         if self.poll() is None:
+            self.forced = self.forced or number == signal.SIGKILL
             os.kill(self._popen.pid, number)
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self._popen.pid
+
+    @property
+    def state(self) -> str:
+        """The state of its process as a letter: R, S, D, T (stopped), t (held by a debugger), Z; empty if gone."""
+        try:
+            stat = Path(f"/proc/{self.pid}/stat").read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return ""
+        return stat.rpartition(")")[2].split()[0]
 
     @property
     def death(self) -> str:

@@ -192,11 +192,13 @@ class Host:
             while not stopped() and (component.exit_code is None or outbox.waiting):
                 outbox.flush()
                 busy = component.busy and not outbox.waiting
+                idle_s = _HELD_BACK_S if outbox.waiting else _IDLE_S
                 with contextlib.suppress(ExternalShutdownException):
-                    executor.spin_once(0.0 if busy else _HELD_BACK_S if outbox.waiting else _IDLE_S)
-                if component.busy and not outbox.waiting and component.exit_code is None:
+                    executor.spin_once(min(self._pacer.left_s, idle_s) if busy else idle_s)
+                ready = component.busy and not outbox.waiting and component.exit_code is None
+                if ready and self._pacer.left_s <= 0.0:
                     component.work()
-                    self._pacer.wait(component.stamp_ns)
+                    self._pacer.worked(component.stamp_ns)
             if component.exit_code is not None:
                 self._say(0, component.exit_reason)
             self._publish_health()
@@ -282,20 +284,31 @@ def _switch(switch: Callable[[bool], tuple[bool, str]], request: Any, response: 
 
 
 class Pacer:
-    """Holds simulated time to a multiple (`factor`) of wall time; a factor of 0 never waits."""
+    """Holds simulated time to a multiple (`factor`) of wall time; a factor of 0 never waits.
 
-    def __init__(self, factor: float) -> None:
+    It says how long to wait and doesn't sleep itself: in slow motion a node goes on answering and reporting.
+    """
+
+    def __init__(self, factor: float, clock: Callable[[], float] = time.monotonic) -> None:
         self.factor = factor
-        self._wall_s: float | None = None
+        self._clock = clock
+        self._due_s: float | None = None
         self._simulated_ns = 0
 
-    def wait(self, stamp_ns: int) -> None:
-        """Sleep until the wall clock has caught up. Standing still doesn't build up credit to be made good later."""
-        if self.factor <= 0.0:
-            return
-        now = time.monotonic()
-        step_s = (stamp_ns - self._simulated_ns) * 1e-9 / self.factor
+    @property
+    def left_s(self) -> float:
+        """Wall seconds that the next piece of work has to wait."""
+        if self.factor <= 0.0 or self._due_s is None:
+            return 0.0
+        return max(0.0, self._due_s - self._clock())
+
+    def worked(self, stamp_ns: int) -> None:
+        """Take note of the simulated time reached. Standing still doesn't build up credit to be made good later."""
+        step_ns = stamp_ns - self._simulated_ns
         self._simulated_ns = stamp_ns
-        due = max(now, (self._wall_s or now) + step_s)
-        self._wall_s = due
-        time.sleep(max(0.0, due - now))
+        if self.factor <= 0.0:
+            self._due_s = None
+            return
+        now = self._clock()
+        step_s = step_ns * 1e-9 / self.factor
+        self._due_s = max(now, (self._due_s or now) + step_s)

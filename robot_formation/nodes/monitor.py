@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import TracebackType
@@ -53,7 +54,12 @@ def topic_of(name: str) -> names.Topic:
 
 
 class Monitor:
-    """Listens to topics of a domain; a context manager. `spin` takes what has arrived."""
+    """Listens to topics of a domain, and to the nodes' reports; a context manager. `spin` takes what has arrived.
+
+    Attributes:
+        messages: how many have come on the topics.
+        reports: how often each node, by its full name, has reported on /diagnostics.
+    """
 
     def __init__(self, environment: Mapping[str, str], topics: list[str], listen: Callable[[str, Any], None]) -> None:
         """Join the graph.
@@ -73,10 +79,16 @@ class Monitor:
         self._executor.add_node(self._node)
         self._listen = listen
         self.messages = 0
+        self.reports: Counter[str] = Counter()
         for name in topics:
             topic = topic_of(name)
             message_class = conversions.message_class(topic.type)
             self._node.create_subscription(message_class, name, partial(self._take, name), qos_profile(topic.qos))
+
+        health = names.DIAGNOSTICS
+        self._node.create_subscription(
+            conversions.message_class(health.type), health.name, self._take_report, qos_profile(health.qos)
+        )
 
     def spin(self, timeout_s: float) -> None:
         """Wait for a message at most so long; take it and what else is there."""
@@ -86,10 +98,12 @@ class Monitor:
             before = self.messages
             self._executor.spin_once(0.0)
 
-    def drain(self, round_s: float) -> None:
-        """Take what is still on its way: until some rounds in a row have brought nothing."""
+    def drain(self, round_s: float, enough: Callable[[], bool] = lambda: False) -> None:
+        """Take what is still on its way: until it is enough, or some rounds in a row have brought nothing."""
         quiet = 0
         for _ in range(_MOST_ROUNDS):
+            if enough():
+                return
             before = self.messages
             self.spin(round_s)
             quiet = quiet + 1 if self.messages == before else 0
@@ -108,6 +122,10 @@ class Monitor:
         # The shared memory of this participant is given back with the last reference, and rclpy's objects form cycles.
         del self._executor, self._node, self._context
         gc.collect()
+
+    def _take_report(self, message: Any) -> None:
+        for status in message.status:
+            self.reports[status.name] += 1
 
     def _take(self, topic: str, message: Any) -> None:
         self.messages += 1

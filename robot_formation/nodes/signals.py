@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import signal
+import sys
 from typing import Any
+
+from robot_formation import exit_codes
+from robot_formation.shared_memory_space import SharedMemoryError, require_space
 
 _NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _stop = False
 
 
 def stop_on_signals() -> None:
-    """Let SIGINT, SIGTERM and SIGHUP set a flag that the main loops look at (SIGHUP only if nobody ignores it)."""
+    """Let SIGINT, SIGTERM and SIGHUP set a flag that the main loops look at (SIGHUP only if nobody ignores it).
+
+    Ends the process where ROS can't be loaded.
+    """
 
     def handler(number: int, frame: Any) -> None:
         global _stop
@@ -19,6 +26,11 @@ def stop_on_signals() -> None:
     for number in _NUMBERS:
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, handler)
+    try:
+        require_space()
+    except SharedMemoryError as error:
+        print(error, file=sys.stderr)
+        raise SystemExit(exit_codes.BAD_INPUT) from None
 
 
 def ignore_signals() -> None:
