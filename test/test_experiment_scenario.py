@@ -326,7 +326,7 @@ def test_a_config_file_of_another_form_is_answered_with_the_form_it_needs(tmp_pa
         ("predictor.name", "mesured", "predictor:=", "predictor:= can't be 'mesured'; did you mean 'measured'?"),
         ("seed", -1, "--seed", "--seed is -1, outside 0 to 9223372036854775807"),
         ("seed", "one", "seed:=", "seed:= must be of type int, not 'one'"),
-        ("seed", "[1", "seed:=", "seed:=: '[1' is no YAML value"),
+        ("seed", "[1", "seed:=", "seed:=: '[1' is no YAML value: did not find expected ',' or ']'"),
         ("world.camera.mode", "streem", "--camera", "--camera can't be 'streem'; did you mean 'stream'?"),
         ("world.real_time_factor", -1.0, "--real-time-factor", "--real-time-factor is -1.0, outside 0.0 to 1000.0"),
     ],
