@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
         return _sweep(args, plan, place.path)
 
 
-def _sweep(args: argparse.Namespace, plan: sweep.Plan, folder: Path) -> int:
+def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
     from robot_formation.analysis.sweep_summary import summarise, table
     from robot_formation.experiment import sweep
 
