@@ -14,7 +14,7 @@ _ENDS_S = 5.0
 
 
 def run_parallel(function: Callable[..., T], arguments: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[T]:
-    """Call a function with each tuple of arguments in worker processes; yield the results in their order.
+    """Call a function with each tuple of arguments in worker processes; yield results in the same order.
 
     Raises:
         BrokenExecutor: a worker process died.
