@@ -187,7 +187,8 @@ class Host:
         executor.add_node(self._node)
         component, outbox = self._component, self._outbox
         component.start()
-        self._say(0, self._ready())
+        if not stopped():
+            self._say(0, self._ready())
         try:
             while not stopped() and (component.exit_code is None or outbox.waiting):
                 outbox.flush()
