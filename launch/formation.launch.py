@@ -26,6 +26,7 @@ from robot_formation.launching.arguments import (
     rviz_config,
     rviz_remappings,
     scenario_of,
+    viewer_environment,
 )
 from robot_formation.launching.launcher import RECORDER_PATIENCE_S
 from robot_formation.launching.outcome import LaunchedRun
@@ -54,7 +55,8 @@ def nodes(context: LaunchContext) -> list[Node]:
     started += [node(process, environment, on_exit(run, process, started)) for process in table]
     if viewer:
         pushed = names.absolute("", context.launch_configurations.get("ros_namespace", ""))
-        started.append(rviz(names.absolute(pushed, namespace), environment))
+        seeing = viewer_environment(environment, context.environment)
+        started.append(rviz(names.absolute(pushed, namespace), seeing))
     context.extend_globals({RUNS: [*runs(context), run]})
     return started
 

@@ -34,12 +34,15 @@ def test_help_tells_purpose_usage_topics_and_every_parameter(name):
         assert any(line.startswith(f"  {parameter} (") for line in lines), parameter
 
 
-@pytest.mark.parametrize("name", ["recorder", "player"])
-def test_help_of_the_nodes_for_bags(name):
+@pytest.mark.parametrize(
+    ("name", "parameter"),
+    [("recorder", "regex (string, '')"), ("player", "regex (string, '')"), ("progress", "followers (integer, 1)")],
+)
+def test_help_of_the_nodes_for_bags_and_launched_runs(name, parameter):
     done = node(name, "-h")
     assert (done.returncode, done.stderr) == (0, "")
     assert "topics and services" in done.stdout
-    assert "regex (string, '')" in done.stdout
+    assert parameter in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ import yaml
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.loopback import PROFILES, RANGE, use_loopback
 from robot_formation.paths import config_dir
 
-DISCOVERY = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _SWITCH = ("true", "false", "True", "False", "1", "0")
 _OPENING, _CLOSING = "[{", "]}"
 _BEFORE_QUOTE = "=[{,: "
@@ -44,7 +44,7 @@ ARGUMENTS = {
     "rviz": Argument("false", "show the run in RViz, which must be installed; closing it doesn't end the run", _SWITCH),
     "discovery_range": Argument(
         "",
-        f"who may find the nodes; empty: what {DISCOVERY} says, else LOCALHOST",
+        f"who may find the nodes; empty: what {RANGE} says, else LOCALHOST",
         ("", "LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT"),
     ),
 }
@@ -104,8 +104,20 @@ def is_true(text: str) -> bool:
 
 def discovery(argument: str, environment: Mapping[str, str]) -> dict[str, str]:
     """Tell which variables the nodes need so that those find them who should: the argument, else what is exported."""
-    wanted = argument or ("" if environment.get(DISCOVERY) else "LOCALHOST")
-    return {DISCOVERY: wanted} if wanted else {}
+    wanted = argument or ("" if environment.get(RANGE) else "LOCALHOST")
+    return {RANGE: wanted} if wanted else {}
+
+
+def viewer_environment(given: Mapping[str, str], exported: Mapping[str, str]) -> dict[str, str]:
+    """Tell which variables a viewer needs; our nodes bind themselves to the loopback interface, it can't.
+
+    Args:
+        given: what the nodes are given.
+        exported: what is inherited.
+    """
+    whole = {**exported, **given}
+    use_loopback(whole)
+    return {name: whole[name] for name in (RANGE, *PROFILES) if name in whole}
 
 
 def rviz_config() -> Path:

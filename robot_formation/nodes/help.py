@@ -18,6 +18,10 @@ _WIDTH = 110
 _OTHERS = {
     "recorder": ("recording", (("reads", "any topic that has a publisher"), ("writes", names.DIAGNOSTICS.name))),
     "player": ("playing", (("writes", "the topics of the bag"),)),
+    "progress": (
+        "following",
+        (("reads", "ground_truth/<robot>/pose"), ("reads", "<follower>/moved, displacement and alignment")),
+    ),
 }
 
 
