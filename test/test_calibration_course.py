@@ -9,10 +9,10 @@ from world_helpers import IDEAL, parameters
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.distance_comparison import Travelled, compare_distances
 from robot_formation.control.drive import CalibrationParameters, Drive, DriveParameters
-from robot_formation.control.motion import Motion
 from robot_formation.experiment.calibration_course import Course, RobotOnCourse
 from robot_formation.experiment.calibration_encoders import measure_encoders
 from robot_formation.experiment.calibration_motors import calibrate_motors, calibrate_robot, preset_rotations
+from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import make_surface
 
 DRIVE = DriveParameters()

@@ -63,7 +63,7 @@ def test_without_a_file_nothing_changes():
 
 def test_the_drive_component_drives_by_its_own_section(file):
     from robot_formation import conversions
-    from robot_formation.control.motion import Motion
+    from robot_formation.geometry.se2 import Motion
 
     sent = {}
     for robot in ("leader", "follower_1"):

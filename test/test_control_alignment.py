@@ -15,7 +15,7 @@ from robot_formation.control.alignment import (
     Verdict,
     hulls,
 )
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.block import Block
 

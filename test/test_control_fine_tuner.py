@@ -17,7 +17,7 @@ from robot_formation.control.fine_tuner import (
     State,
     Warn,
 )
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.block import Block
 

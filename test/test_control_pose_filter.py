@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robot_formation.control.alignment import FRONT, TARGET, hulls
-from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, legs, way_to
+from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, count_legs
 from robot_formation.control.drive_experience import DriveExperience
 from robot_formation.control.marker_view import mean_boxes, one_marker
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 from robot_formation.control.pose_filter import FilterParameters, PoseFilter
-from robot_formation.control.relative_pose import SADDLE, SKEW, YAW, X, Y, after_motion, leans, way_to_formation
+from robot_formation.control.relative_pose import SADDLE, SKEW, YAW, X, Y, after_motion, leans, pose_of
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.vision.block import Block
 
 LOOKS_FROM = (0.135, -0.135, 0.12, -0.12)
@@ -62,15 +62,15 @@ def test_the_heading_follows_from_looks_behind_and_ahead(yaw_rad, slip_m):
 )  # fmt: skip
 def test_moves_compose(x_m, y_m, yaw_rad, dx_m, dy_m, turn_rad):
     state, motion = state_of(x_m, y_m, yaw_rad), Motion(dx_m, dy_m, turn_rad)
-    way = motion.then(way_to_formation(after_motion(state, motion)))
-    direct = way_to_formation(state)
+    way = motion.then(pose_of(after_motion(state, motion)).then(FORMATION))
+    direct = pose_of(state).then(FORMATION)
     assert (way.x_m, way.y_m, way.yaw_rad) == pytest.approx((direct.x_m, direct.y_m, direct.yaw_rad), abs=1e-12)
 
 
 @given(st.floats(-0.2, 0.2), st.floats(0.25, 0.8), st.floats(-1.0, 1.0))
 def test_the_way_to_formation_leads_there(x_m, y_m, yaw_rad):
     state = state_of(x_m, y_m, yaw_rad)
-    there = after_motion(state, way_to(state, FORMATION))
+    there = after_motion(state, pose_of(state).then(FORMATION))
     assert there[:3] == pytest.approx((0.0, FORMATION_DISTANCE_M, 0.0), abs=1e-12)
 
 
@@ -148,7 +148,7 @@ def test_what_is_learned_of_short_legs_adds_no_leg_that_was_not_asked_for():
         experience.moved(Motion(0.0, aside_m), Motion(0.0, 0.5 * aside_m))
     for ahead_m in np.linspace(-0.19, 0.19, 21):
         asked = Motion(ahead_m * math.cos(turned), ahead_m * math.sin(turned), turned)
-        assert legs(experience.compensated(asked)) == legs(asked)
+        assert count_legs(experience.compensated(asked)) == count_legs(asked)
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-0.3, 0.3), st.floats(0.2, 0.5), st.floats(-3.0, 3.0))

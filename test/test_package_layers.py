@@ -11,6 +11,7 @@ PACKAGE = Path(__file__).parent.parent / "robot_formation"
 
 LAYERS = [
     {"", "errors", "exit_codes", "names", "parameters", "paths", "tags"},
+    {"geometry"},
     {"surface"},
     {"world"},
     {"control", "koopman", "vision"},

@@ -18,7 +18,7 @@ from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
 from robot_formation.bag.reader import Bag, read_bag
 from robot_formation.bag.recorder import METADATA_NAME
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import suggestion
 
 _TRIANGLE_LIST = 11

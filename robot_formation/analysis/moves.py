@@ -14,7 +14,6 @@ loss
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -22,7 +21,7 @@ from statistics import median
 from typing import Any
 
 from robot_formation.analysis.record import FollowerRecord
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 
 AXES = ("u", "v", "turn")
 UNKNOWN = "unknown"
@@ -172,8 +171,8 @@ def _legs(follower: FollowerRecord, indices: Sequence[int]) -> Iterator[tuple[st
 
 def _sizes(motion: Motion) -> tuple[float, float, float]:
     """Lengths of a move's legs along u and v and of its turn; the drive turns first."""
-    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-    return abs(c * motion.y_m - s * motion.x_m), abs(c * motion.x_m + s * motion.y_m), abs(motion.yaw_rad)
+    turn, forward, left = motion.legs
+    return abs(left), abs(forward), abs(turn)
 
 
 def _seconds(follower: FollowerRecord, first: int, last: int) -> float | None:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from robot_formation.analysis.drawing import new_figure, save_figure
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.control.sightings import Kind, Overlay, Sighting, kinds_of, overlay
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
 _CM = 100.0
 # The paper's colours, from Okabe and Ito's palette.

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from robot_formation.control.edge_bias import EdgeBias
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.control.sightings import Overlay, Sighting, overlay
 from robot_formation.control.vision_fit import (
     WINDOW_M,
@@ -19,6 +18,7 @@ from robot_formation.control.vision_fit import (
     difference_px,
     pan_distances,
 )
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
 _SYMBOLS = {
     "unattainable": "#",

@@ -9,8 +9,8 @@ from typing import Any
 from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.control import fine_tuner as core
-from robot_formation.control.motion import Motion
 from robot_formation.control.vision_calibration import calibrated
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
 
 # (u, v) to (x, y) = (v, -u): how a covariance of the paper's axes becomes one of REP-103.
@@ -152,4 +152,4 @@ def _uv(message: Any) -> Any:
     if not conversions.has_estimate(message):
         return None
     motion = conversions.read_displacement(message)
-    return np.array([motion.u_m, motion.v_m])
+    return np.array(motion.uv_m)

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 from robot_formation.control.alignment import TARGET, Box, Decision, Verdict
 from robot_formation.control.alignment_modes import Frames
-from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, legs, way_to
+from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, count_legs
 from robot_formation.control.drive_experience import DriveExperience
 from robot_formation.control.leader_search import LeaderSearch, SearchParameters
 from robot_formation.control.marker_view import EdgeParameters, mean_boxes
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
 from robot_formation.control.pose_filter import FilterParameters, PoseFilter
-from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y, after_motion
+from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y, after_motion, pose_of
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.parameters import parameter
 
 _SURPRISE = 6.0
@@ -109,7 +109,7 @@ class PreciseAlignment:
         """Tell the turn [rad] to make with the prediction move."""
         if not self._filter.known:
             return 0.0
-        heading = way_to(self._filter.best.state, FORMATION).yaw_rad
+        heading = pose_of(self._filter.best.state).then(FORMATION).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
 
     def moved(self, asked: Motion, motion: Motion) -> None:
@@ -120,7 +120,7 @@ class PreciseAlignment:
 
     def offset(self) -> Motion | None:
         """Estimate the way to the formation position in the follower's frame."""
-        return way_to(self._filter.best.state, FORMATION) if self._filter.known else None
+        return pose_of(self._filter.best.state).then(FORMATION) if self._filter.known else None
 
     def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
@@ -132,7 +132,7 @@ class PreciseAlignment:
             strange = False
         if not boxes or strange:
             decision = self._search.missed(self._last if self._moves else Motion(), self.offset())
-            self._moves += legs(decision.motion)
+            self._moves += count_legs(decision.motion)
             return decision
         self._search.found()
         first = not self._filter.known
@@ -149,14 +149,14 @@ class PreciseAlignment:
         if unsure and self._timestep == 0 and self._vantages != []:
             motion, reason = self._to_see_more(state)
         if motion == Motion():
-            if self._within(way_to(state, FORMATION)):
+            if self._within(pose_of(state).then(FORMATION)):
                 return Decision(Verdict.ALIGNED, reason="inside the tolerances")
             motion, reason = self._to_formation(state)
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
-        if self._moves + legs(motion) > p.max_moves:
+        if self._moves + count_legs(motion) > p.max_moves:
             return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
-        self._moves += legs(motion)
+        self._moves += count_legs(motion)
         return Decision(Verdict.MOVE, self._experience.compensated(motion), reason)
 
     def _to_see_more(self, state: Vector) -> tuple[Motion, str]:
@@ -169,8 +169,8 @@ class PreciseAlignment:
             motion = self._without_trifles(self._approach.next(states, vantage), _VANTAGE_NEAR)
             if motion == Motion():
                 continue
-            left = self._without_trifles(way_to(after_motion(state, motion), FORMATION), self._trifle())
-            needed = legs(motion) + self._approach.moves(left) + _SPARE_MOVES
+            left = self._without_trifles(pose_of(after_motion(state, motion)).then(FORMATION), self._trifle())
+            needed = count_legs(motion) + self._approach.moves(left) + _SPARE_MOVES
             affordable = self._p.max_moves - self._moves >= min(needed, _ENOUGH_MOVES)
             return (motion, "to see two faces") if affordable else (Motion(), "")
         return Motion(), ""
@@ -220,13 +220,12 @@ class PreciseAlignment:
     @staticmethod
     def _without_trifles(motion: Motion, trifle: Motion) -> Motion:
         """Leave out legs that are hardly worth a move."""
-        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-        x, y = c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m
-        yaw = motion.yaw_rad if abs(motion.yaw_rad) > trifle.yaw_rad else 0.0
-        x = x if abs(x) > trifle.x_m else 0.0
-        y = y if abs(y) > trifle.y_m else 0.0
-        c, s = math.cos(yaw), math.sin(yaw)
-        return Motion(c * x - s * y, s * x + c * y, yaw)
+        turn, forward, left = motion.legs
+        return Motion.from_legs(
+            turn if abs(turn) > trifle.yaw_rad else 0.0,
+            forward if abs(forward) > trifle.x_m else 0.0,
+            left if abs(left) > trifle.y_m else 0.0,
+        )
 
     def _places(self, state: Vector) -> Iterator[Motion]:
         """Yield the places left to look from, behind and ahead in turn; the one that is asked beyond is done with.
@@ -234,7 +233,7 @@ class PreciseAlignment:
         The outer edges of Front and Rear are biased alike, so that the two sides' errors in heading cancel.
         """
         if self._vantages is None:
-            behind = way_to(state, Motion()).x_m > 0.0
+            behind = pose_of(state).x_m > 0.0
             self._vantages = [-place if behind else place for place in _VANTAGES_M]
         while self._vantages:
             yield Motion(self._vantages[0], -_VANTAGE_BESIDE_M, 0.0)

@@ -14,7 +14,7 @@ from enum import Enum, auto
 from robot_formation.control.alignment import AlignmentParameters, Decision, Verdict
 from robot_formation.control.alignment_modes import AlignmentMode, PaperMode
 from robot_formation.control.alignment_precise import PreciseAlignment, PreciseParameters
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
 from robot_formation.control.marker_view import EdgeParameters, View, one_marker, view
-from robot_formation.control.motion import Motion
 from robot_formation.control.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.control.relative_pose import (
     CURVATURE,
@@ -32,6 +31,7 @@ from robot_formation.control.relative_pose import (
     after_motion,
     leans,
 )
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET
 from robot_formation.control.marker_view import Edge
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 
 Vector = NDArray[np.float64]
@@ -155,17 +155,14 @@ def _tilts(roll: Vector, pitch: Vector) -> Matrix:
 
 
 def after_motion(state: Vector, motion: Motion) -> Vector:
-    """Tell the state after the follower's motion."""
-    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-    dx, dy = state[X] - motion.x_m, state[Y] - motion.y_m
+    """Return the state after the follower's motion."""
+    pose = pose_of(state).relative_to(motion)
     c2, s2 = math.cos(2.0 * motion.yaw_rad), math.sin(2.0 * motion.yaw_rad)
     more, mixed = state[SADDLE], state[SKEW]
     ground = [state[CURVATURE], c2 * more - s2 * mixed, c2 * mixed + s2 * more]
-    return np.array([c * dx + s * dy, c * dy - s * dx, state[YAW] - motion.yaw_rad, *ground])
+    return np.array([pose.x_m, pose.y_m, pose.yaw_rad, *ground])
 
 
-def way_to_formation(state: Vector) -> Motion:
-    """Tell the motion of the follower that brings it beside its neighbour."""
-    c, s = math.cos(state[YAW]), math.sin(state[YAW])
-    d = FORMATION_DISTANCE_M
-    return Motion(float(state[X] + s * d), float(state[Y] - c * d), float(state[YAW]))
+def pose_of(state: Vector) -> Motion:
+    """Return the neighbour's pose in the follower's level frame."""
+    return Motion(float(state[X]), float(state[Y]), float(state[YAW]))

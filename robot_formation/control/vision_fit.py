@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from robot_formation.control.alignment import TARGET, Box, hulls
 from robot_formation.control.calibration import CalibrationError
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.control.sightings import Sighting
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.drive import JOINTS, LEG_SIGNS, Drive
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import Surface
 from robot_formation.world.events import JointStates
 from robot_formation.world.imperfections import generator

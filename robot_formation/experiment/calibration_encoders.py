@@ -11,8 +11,8 @@ from collections.abc import Callable
 from robot_formation.control.calibration import calibrated, limits
 from robot_formation.control.distance_comparison import Travelled
 from robot_formation.control.drive import LEG_SIGNS, Drive, DriveParameters
-from robot_formation.control.motion import Motion
 from robot_formation.experiment.calibration_course import LEGS, Course, RobotOnCourse
+from robot_formation.geometry.se2 import Motion
 
 AXES = ("v", "u")
 PRESETS = 10

@@ -19,9 +19,9 @@ from robot_formation.components.fine_tuner import FineTunerNodeParameters
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters
 from robot_formation.control.alignment import AlignmentParameters
-from robot_formation.control.motion import Motion
 from robot_formation.experiment.in_process import InProcessRun, absolute
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters

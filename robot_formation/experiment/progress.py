@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 
 _SAME_M = 1e-6
 

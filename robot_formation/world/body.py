@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from robot_formation.geometry.orientation import Vector, rotate
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
 from robot_formation.world.events import BodyState
 from robot_formation.world.imperfections import Imperfections
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import Pose, Vector, rotate
+from robot_formation.world.pose import Pose
 from robot_formation.world.wheel import DRIVING, HELD, Wheel
 
 HALF_ROOT = math.sqrt(0.5)

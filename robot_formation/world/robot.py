@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from robot_formation.geometry.orientation import quaternion
 from robot_formation.surface import Surface
 from robot_formation.world.body import Body
 from robot_formation.world.events import JOINT_NAMES, JointStates
 from robot_formation.world.imperfections import draw_imperfections, generator
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import Pose, pose_on_surface, quaternion
+from robot_formation.world.pose import Pose, pose_on_surface
 from robot_formation.world.wheel import HELD
 
 SETTLING_ROUNDS = 4
