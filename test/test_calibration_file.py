@@ -13,7 +13,7 @@ from robot_formation.control.calibration import (
     save_calibration,
 )
 from robot_formation.control.drive import CalibrationParameters, DriveParameters
-from robot_formation.experiment.drive_curves import describe_curves, robot_curves, robot_facts
+from robot_formation.experiment.drive_check import describe_curves, robot_curves, robot_facts
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
 

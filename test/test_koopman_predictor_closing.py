@@ -179,18 +179,18 @@ def test_the_mixture_weighs_by_discounted_squared_errors_with_a_handicap():
         if models is not None:
             losses = p.discount * losses + 0.5 * ((models - seen) / scale) ** 2
         tested.observe(x)
-        koopman = 0.05 * (tested.insight().k[1:] @ [1.0, *(x / 0.05)])
+        koopman = 0.05 * (tested.diagnostics().k[1:] @ [1.0, *(x / 0.05)])
         models = np.stack([x, koopman])
         weights = np.exp(-losses) / np.exp(-losses).sum(axis=0)
         assert tested.forecast() == pytest.approx((weights * models).sum(axis=0), abs=1e-14)
     shown = np.array2string(weights[1], precision=3, separator=", ")
-    assert tested.insight().notes["weight of koopman"] == shown
+    assert tested.diagnostics().notes["weight of koopman"] == shown
 
 
 def test_persistence_is_believed_first():
     tested = Mixture(PredictorParameters())
     tested.observe(np.array([0.0, 0.05]))
-    weight = float(tested.insight().notes["weight of koopman"].strip("[]").split(",")[0])
+    weight = float(tested.diagnostics().notes["weight of koopman"].strip("[]").split(",")[0])
     assert weight == pytest.approx(1.0 / (1.0 + np.e), abs=1e-3)
 
 

@@ -16,7 +16,7 @@ from robot_formation.cli.calibrate_vision import run_vision
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.experiment.calibration_course import Course
+    from robot_formation.experiment.calibration_rig import CalibrationRig
     from robot_formation.experiment.scenario import Scenario
 
 DESCRIPTION = "Measure the robots of a scenario, each alone in the middle of the plate, or the follower's camera."
@@ -101,14 +101,14 @@ def run_motors(args: argparse.Namespace) -> int:
     from robot_formation.control.calibration import MotorCalibration, save_calibration
     from robot_formation.control.drive import DriveParameters
     from robot_formation.experiment.calibration_motors import calibrate_motors, curves
-    from robot_formation.experiment.drive_curves import robot_facts
+    from robot_formation.experiment.drive_check import robot_facts
     from robot_formation.parameters import from_mapping
 
     scenario = build_scenario(args, with_curves=False)
     folder = free_folder(args, scenario, (CALIBRATION_FILE, MOTORS_PICTURE))
     drive = from_mapping(DriveParameters, scenario.parameters("drive"), where="drive")
-    course = make_course(args, scenario)
-    fits = calibrate_motors(course, scenario.robots, drive, args.repeats, _say)
+    rig = make_rig(args, scenario)
+    fits = calibrate_motors(rig, scenario.robots, drive, args.repeats, _say)
     conditions = {**_conditions(args, scenario), **robot_facts(scenario)}
     save_calibration(folder / CALIBRATION_FILE, MotorCalibration(curves(fits).robots, conditions))
     picture = draw_motors(fits, f"Motor calibration · {_told(args, scenario)}", folder / MOTORS_PICTURE)
@@ -134,7 +134,7 @@ def run_encoders(args: argparse.Namespace) -> int:
     from robot_formation.control.distance_comparison import compare_distances
     from robot_formation.control.drive import DriveParameters
     from robot_formation.experiment.calibration_encoders import measure_encoders
-    from robot_formation.experiment.drive_curves import describe_curves
+    from robot_formation.experiment.drive_check import describe_curves
     from robot_formation.parameters import from_mapping, suggestion
 
     scenario = build_scenario(args, with_curves=True)
@@ -143,8 +143,8 @@ def run_encoders(args: argparse.Namespace) -> int:
     folder = free_folder(args, scenario, (ENCODERS_PICTURE,))
     drive = from_mapping(DriveParameters, scenario.parameters("drive"), where="drive")
     _say(describe_curves(scenario))
-    course = make_course(args, scenario)
-    comparisons = compare_distances(measure_encoders(course, args.robot, drive, args.repeats, _say))
+    rig = make_rig(args, scenario)
+    comparisons = compare_distances(measure_encoders(rig, args.robot, drive, args.repeats, _say))
     title = f"{args.robot.replace('_', ' ')}, travelled distances · {_told(args, scenario)}"
     picture = draw_encoders(comparisons, title, folder / ENCODERS_PICTURE)
     if args.json:
@@ -179,14 +179,14 @@ def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
     return scenario
 
 
-def make_course(args: argparse.Namespace, scenario: Scenario) -> Course:
-    """Make the course of the scenario's ground and robots."""
+def make_rig(args: argparse.Namespace, scenario: Scenario) -> CalibrationRig:
+    """Make the calibration rig of the scenario's ground and robots."""
     from robot_formation.components.catalogue import KINDS
-    from robot_formation.experiment.calibration_course import Course
+    from robot_formation.experiment.calibration_rig import CalibrationRig
     from robot_formation.parameters import from_mapping
 
     world = from_mapping(KINDS["world"].parameter_class(), scenario.parameters("world"), where="world")
-    return Course(world.make_surface(), world, scenario.setup.seed, args.reference_noise)
+    return CalibrationRig(world.make_surface(), world, scenario.setup.seed, args.reference_noise)
 
 
 def free_folder(args: argparse.Namespace, scenario: Scenario, files: tuple[str, ...]) -> Path:

@@ -127,8 +127,8 @@ def default_bag(scenario: Scenario) -> Path:
 
 def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResult:
     """Run the scenario in the way that the options ask for."""
-    from robot_formation.experiment.camera_facts import describe_camera
-    from robot_formation.experiment.drive_curves import describe_curves
+    from robot_formation.experiment.camera_check import describe_camera
+    from robot_formation.experiment.drive_check import describe_curves
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)

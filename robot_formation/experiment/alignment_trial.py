@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 
 from robot_formation import names
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
-from robot_formation.control.approach import count_legs
 from robot_formation.control.drive import Drive, DriveParameters
 from robot_formation.control.fine_tuner import (
     Action,
@@ -21,6 +20,7 @@ from robot_formation.control.fine_tuner import (
     SendMove,
     State,
 )
+from robot_formation.control.motion_planner import count_legs
 from robot_formation.geometry.footprint import footprint_gap_m
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion, formation_error_uv_m
 from robot_formation.surface import Surface

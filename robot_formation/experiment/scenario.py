@@ -14,8 +14,8 @@ import yaml
 from robot_formation import names
 from robot_formation.components.catalogue import KINDS, NodeKind
 from robot_formation.errors import FormationError
-from robot_formation.experiment.camera_facts import check_camera
-from robot_formation.experiment.drive_curves import check_curves
+from robot_formation.experiment.camera_check import check_camera
+from robot_formation.experiment.drive_check import check_curves
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
 from robot_formation.paths import config_dir

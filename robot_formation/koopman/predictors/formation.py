@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from robot_formation.koopman.predictors.dmd import Edmd
-from robot_formation.koopman.predictors.models import Insight, Matrix, Model, Previous, Vector, array
+from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Model, Previous, Vector, array
 from robot_formation.koopman.predictors.parameters import PredictorParameters
 
 
@@ -44,12 +44,12 @@ class Mixture:
         """See `Model`."""
         return np.asarray((self._weights() * self._forecasts()).sum(axis=0))
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """See `Model`: that of the Koopman model, and how much it counts."""
-        inner = self._koopman.insight()
+        inner = self._koopman.diagnostics()
         notes = dict(inner.notes or {})
         notes["weight of koopman"] = np.array2string(self._weights()[1], precision=3, separator=", ")
-        return Insight(inner.k, inner.condition_number, inner.innovation, notes)
+        return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""

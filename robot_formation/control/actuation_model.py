@@ -22,7 +22,7 @@ _MOST_SHORT_M = 0.006
 _SHORT_GAIN = 0.5
 
 
-class DriveExperience:
+class ActuationModel:
     """Running means over the latest moves.
 
     Attributes:

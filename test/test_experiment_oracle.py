@@ -9,8 +9,8 @@ from robot_formation import conversions
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters
 from robot_formation.control.alignment import AlignmentParameters
-from robot_formation.experiment.ideal import IdealRun, TargetFace
 from robot_formation.experiment.in_process import InProcessRun
+from robot_formation.experiment.oracle import IdealRun, TargetFace
 from robot_formation.experiment.scenario import load_track, override, with_surface
 from robot_formation.experiment.sweep import Task, run_task
 from robot_formation.geometry.orientation import quaternion

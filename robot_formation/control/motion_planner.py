@@ -28,7 +28,7 @@ _COMPENSATION_M = 0.008
 
 
 @dataclass(frozen=True)
-class ApproachParameters:
+class PlannerParameters:
     """Bodies, and how far one correction may lead."""
 
     body_length_m: float = parameter(0.365, "Length of a robot", unit="m", low=0.0, high=5.0)
@@ -41,10 +41,10 @@ class ApproachParameters:
     reach_m: float = parameter(0.75, "Distance up to which the marker is well seen", unit="m", low=0.1, high=10.0)
 
 
-class Approach:
+class MotionPlanner:
     """Plans one correction at a time."""
 
-    def __init__(self, parameters: ApproachParameters) -> None:
+    def __init__(self, parameters: PlannerParameters) -> None:
         self._p = parameters
 
     def next(self, states: Sequence[Vector], goal: Motion) -> Motion:

@@ -23,7 +23,7 @@ class SearchParameters:
     rounds: int = parameter(2, "Rounds of turns and steps before it counts as lost", low=0, high=100)
 
 
-class LeaderSearch:
+class NeighbourSearch:
     """One search: begins with the first look in vain and ends when the neighbour is seen again."""
 
     def __init__(self, parameters: SearchParameters) -> None:
