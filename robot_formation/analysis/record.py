@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.control.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 
 DOT_HEIGHT_M = 0.216
@@ -79,7 +80,7 @@ class FollowerRecord:
     @property
     def lost(self) -> bool:
         """Whether it lost its beacon neighbour from view."""
-        return any(state.split(":")[0] == "lost" for state in self.states)
+        return any(AlignmentState.parse(text) is AlignmentState.LOST for text in self.states)
 
 
 @dataclass(frozen=True)

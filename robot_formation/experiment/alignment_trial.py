@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from robot_formation import names
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
+from robot_formation.control.alignment_state import AlignmentState, State
 from robot_formation.control.drive import Drive, DriveParameters
 from robot_formation.control.fine_tuner import (
     Action,
@@ -18,7 +19,6 @@ from robot_formation.control.fine_tuner import (
     Lost,
     RequestFrames,
     SendMove,
-    State,
 )
 from robot_formation.control.motion_planner import count_legs
 from robot_formation.geometry.footprint import footprint_gap_m
@@ -36,6 +36,7 @@ from robot_formation.world.world import World
 FOLLOWER = names.follower(1)
 HEADING_RAD = math.pi / 2.0
 _PUSHED_M = 5e-4
+_OUTCOMES = [state.value for state in (AlignmentState.ALIGNED, AlignmentState.UNALIGNED, AlignmentState.LOST)]
 
 
 @dataclass(frozen=True)
@@ -150,8 +151,8 @@ class AlignmentTrial:
                 self._move(motion)
             case RequestFrames(count):
                 self._look(count)
-            case State(text):
-                self.trial.states.append(text)
+            case State():
+                self.trial.states.append(action.text)
             case Lost() | Done():
                 return True
             case _:
@@ -200,7 +201,7 @@ class AlignmentTrial:
             self.trial.touched = True
 
     def _judge(self) -> None:
-        words = [state for state in self.trial.states if state in ("aligned", "unaligned", "lost")]
+        words = [state for state in self.trial.states if state in _OUTCOMES]
         self.trial.outcome = words[-1] if words else "lost"
         leader = self._world.ground_truth(names.LEADER).pose
         follower = self._world.ground_truth(FOLLOWER).pose

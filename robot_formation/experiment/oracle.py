@@ -19,6 +19,7 @@ from robot_formation.components.fine_tuner import FineTunerNodeParameters
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters
 from robot_formation.control.alignment import AlignmentParameters
+from robot_formation.control.alignment_state import AlignmentState
 from robot_formation.experiment.in_process import InProcessRun, absolute
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.geometry.se2 import Motion
@@ -55,7 +56,7 @@ class IdealRun(InProcessRun):
     def _send(self, namespace: str, topic: names.Topic, message: Any) -> None:
         if (robot := self._odometry.get(absolute(namespace, topic.name))) is not None:
             self._poses[robot] = _pose(message.pose.pose)
-        elif topic == names.ALIGNMENT and message.data == "predict":
+        elif topic == names.ALIGNMENT and AlignmentState.parse(message.data) is AlignmentState.PREDICT:
             self._predicting.add(namespace)
         elif topic == names.MOVE and namespace in self._predicting:
             self._predicting.discard(namespace)

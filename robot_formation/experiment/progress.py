@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any
 
 from robot_formation import conversions, names
+from robot_formation.control.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 
 _SAME_M = 1e-6
@@ -77,9 +78,12 @@ class Progress:
         self._heard[robot].timesteps.append((conversions.stamp_of(message), conversions.read_displacement(message)))
 
     def _alignment(self, robot: str, message: Any) -> None:
-        if message.data in ("collect", "predict"):
+        state = AlignmentState.parse(message.data)
+        if state is None:
+            return
+        if state.opens_timestep:
             self._heard[robot].begun += 1
-        elif message.data == "lost":
+        elif state is AlignmentState.LOST:
             self._say(f"{robot}: lost its beacon neighbour in timestep {self._heard[robot].begun}")
 
     def _tell(self) -> None:
