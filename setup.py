@@ -15,6 +15,7 @@ NODES = (
     "overhead_tracker",
     "recorder",
     "player",
+    "progress",
 )
 
 
@@ -41,16 +42,18 @@ setup(
         *shared("launch"),
     ],
     python_requires=">=3.10",
+    # Lower bounds are what .ci/lowest installs and tests (.ci/lowest.txt): mostly what Ubuntu 24.04 has.
     install_requires=[
-        "PyYAML",
-        "joblib",
-        "matplotlib",
-        "mcap",
-        "numpy",
-        "opencv-python-headless",
-        "pybullet",
-        "rosbags>=0.11.2",
-        "zstandard",
+        "PyYAML>=6.0.1",
+        "joblib>=1.3.2",
+        "matplotlib>=3.6.3",
+        "mcap>=1.5.0",
+        "numpy>=1.26.4",
+        "opencv-python-headless>=4.6.0.66",
+        "pillow>=10.2.0",
+        "pybullet>=3.2.6",
+        "rosbags>=0.11.6",
+        "zstandard>=0.22.0",
     ],
     extras_require={
         # ROS 2 Jazzy where none is installed. Not among the requirements: a ROS install brings its own.
@@ -59,11 +62,12 @@ setup(
         "dask": ["dask[distributed]"],
         "test": [
             "colcon-common-extensions",
-            "hypothesis",
+            "dask[distributed]",
+            "hypothesis>=6.98.15",
             "mypy",
             "odmd",
             "pykoop",
-            "pytest",
+            "pytest>=7.4.4",
             "pytest-xdist",
             "ruff",
             "types-PyYAML",
@@ -71,7 +75,7 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            "formation = robot_formation.cli.main:main",
+            "formation = robot_formation.cli.__main__:main",
             *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
         ]
     },

@@ -25,7 +25,12 @@ CM = 100.0
 
 def errors_of(track, seed, calibration):
     """Errors by robot (pictures,) in metres of one run, of which nothing is kept."""
-    settings = [f"seed={seed}", "world.camera.mode=on_demand", f"overhead_tracker.calibration={calibration}"]
+    settings = [
+        f"seed={seed}",
+        "predictor.name=measured",
+        "world.camera.mode=on_demand",
+        f"overhead_tracker.calibration={calibration}",
+    ]
     scenario = override(load_track(track), settings)
     with tempfile.TemporaryDirectory() as folder:
         run_in_process(scenario, Path(folder) / "run", run_metadata(scenario))

@@ -3,7 +3,7 @@
 In both camera modes through the node graph and in one process, each several times; the median is printed. The aims are
 those of the project: `stream` at 5 times real time, `on_demand` at 15, in process below 2 seconds.
 
-Run: python bench/run.py [--rounds N] [--json]
+Run: python bench/run.py [--rounds N] [--predictor NAME] [--json]
 """
 
 import argparse
@@ -26,7 +26,7 @@ from pathlib import Path
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.launching.processes import run_metadata
-scenario = scenarios.override(scenarios.load_track("two"), [f"world.camera.mode={sys.argv[2]}"])
+scenario = scenarios.override(scenarios.load_track("two"), sys.argv[2:])
 result = run_in_process(scenario, Path(sys.argv[1]), run_metadata(scenario))
 print(result.running_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
 sys.exit(result.exit_code)
@@ -37,8 +37,8 @@ def size_mb(bag):
     return sum(path.stat().st_size for path in bag.iterdir()) / 1e6
 
 
-def through_the_graph(mode, folder):
-    scenario = scenarios.override(scenarios.load_track("two"), [f"world.camera.mode={mode}"])
+def through_the_graph(settings, folder):
+    scenario = scenarios.override(scenarios.load_track("two"), settings)
     bag = folder / "bag"
     began = time.monotonic()
     result = Launcher(scenario, bag).run()
@@ -59,11 +59,11 @@ def through_the_graph(mode, folder):
     }
 
 
-def in_process(mode, folder):
+def in_process(settings, folder):
     bag = folder / "bag"
     began = time.monotonic()
     completed = subprocess.run(
-        [sys.executable, "-c", IN_PROCESS, bag, mode], capture_output=True, text=True, check=True
+        [sys.executable, "-c", IN_PROCESS, bag, *settings], capture_output=True, text=True, check=True
     )
     wall_s = time.monotonic() - began
     driving_s, memory_mb = map(float, completed.stdout.split())
@@ -97,13 +97,14 @@ def add_real_time_factor(found):
         r["real_time_factor"] = r["simulated_s"] / r["driving_s"]
 
 
-def measure(rounds):
+def measure(rounds, predictor):
     ways = {(way.__name__, mode): way for way in (through_the_graph, in_process) for mode in AIMS}
     found = {key: [] for key in ways}
     for _ in range(rounds):
         for (name, mode), way in ways.items():
+            settings = [f"world.camera.mode={mode}", f"predictor.name={predictor}"]
             with tempfile.TemporaryDirectory() as folder:
-                found[name, mode].append(way(mode, Path(folder)))
+                found[name, mode].append(way(settings, Path(folder)))
     add_real_time_factor(found)
     return {f"{name} {mode}": median_of(values) for (name, mode), values in found.items()}
 
@@ -111,9 +112,10 @@ def measure(rounds):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--predictor", default="formation", help="of all runs (default: formation)")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    found = measure(args.rounds)
+    found = measure(args.rounds, args.predictor)
     if args.json:
         print(json.dumps(found, indent=2))
         return

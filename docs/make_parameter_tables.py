@@ -18,6 +18,7 @@ from typing import Any
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment.scenario import node_defaults
+from robot_formation.nodes.following import Executable, ProgressParameters
 from robot_formation.nodes.parameters import AT_START, HostParameters, reasons
 from robot_formation.nodes.playing import PlayerNode, PlayerParameters
 from robot_formation.nodes.recording import RecorderNode, RecorderParameters
@@ -41,7 +42,8 @@ _TYPES: dict[Any, str] = {
 def parameter_classes() -> dict[str, type]:
     """List the parameter class of every page, by the page's name."""
     classes = {name: kind.parameter_class() for name, kind in KINDS.items()}
-    return {**classes, "recorder": RecorderParameters, "player": PlayerParameters, COMMON: HostParameters}
+    others = {"recorder": RecorderParameters, "player": PlayerParameters, "progress": ProgressParameters}
+    return {**classes, **others, COMMON: HostParameters}
 
 
 def fixed_parameters(name: str) -> Mapping[str, str]:
@@ -49,7 +51,8 @@ def fixed_parameters(name: str) -> Mapping[str, str]:
     if name in KINDS:
         fixed: Mapping[str, str] = KINDS[name].component_class().fixed
         return fixed
-    return {"recorder": RecorderNode.fixed, "player": PlayerNode.fixed, COMMON: {"*": AT_START}}[name]
+    others = {"recorder": RecorderNode.fixed, "player": PlayerNode.fixed, "progress": Executable.fixed}
+    return {**others, COMMON: {"*": AT_START}}[name]
 
 
 def changes(name: str, parameters: type) -> str:

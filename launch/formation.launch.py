@@ -1,85 +1,144 @@
 """Start a run's nodes on a ROS 2 install, with the arguments below: ros2 launch robot_formation formation.launch.py.
 
-The nodes come from the same table as those of `formation run` (robot_formation/launching/processes.py).
+The nodes come from the same table as those of `formation run` (robot_formation/launching/processes.py). Their names are
+relative: they lie below the namespace that is pushed where this file is included.
 """
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable, Shutdown
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+from launch.actions import DeclareLaunchArgument, EmitEvent, LogInfo, OpaqueFunction
+from launch.events import Shutdown, matches_action
+from launch.events.process import ShutdownProcess
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from robot_formation.experiment import scenario as scenarios
-from robot_formation.launching.processes import processes
-from robot_formation.paths import config_dir
+from robot_formation import names
+from robot_formation.bag.place import check_free
+from robot_formation.errors import FormationError
+from robot_formation.launching.arguments import (
+    ARGUMENTS,
+    discovery,
+    is_true,
+    rviz_config,
+    rviz_remappings,
+    scenario_of,
+    viewer_environment,
+)
+from robot_formation.launching.launcher import RECORDER_PATIENCE_S
+from robot_formation.launching.outcome import LaunchedRun
+from robot_formation.launching.processes import Process, processes, progress
 
-ARGUMENTS = {
-    "track": ("two", "preset track: see 'formation list tracks'"),
-    "scenario": ("", "scenario file, instead of a track"),
-    "surface": ("", "surface: see 'formation list surfaces'; empty: the scenario's"),
-    "predictor": ("", "predictor: see 'formation list predictors'; empty: the scenario's"),
-    "seed": ("", "seed of every random stream; empty: the scenario's"),
-    "camera": ("", "stream or on_demand; empty: the scenario's"),
-    "real_time_factor": ("", "0: as fast as possible, 1: real time; empty: the scenario's"),
-    "set": ("", "further settings, separated by spaces, like 'predictor.forgetting=0.95 followers=2'"),
-    "bag": ("", "folder of the bag, which must not exist; empty: nothing is recorded"),
-    "images": ("false", "record pictures too"),
-    "rviz": ("false", "show the run in RViz, where rviz2 is installed; closing it doesn't end the run"),
-    "discovery_range": ("LOCALHOST", "who may find the nodes: LOCALHOST, SUBNET, OFF or SYSTEM_DEFAULT"),
-}
+PACKAGE = "robot_formation"
+RUNS = "robot_formation_runs"
 
 
 def nodes(context: LaunchContext) -> list[Node]:
-    """List the nodes of the scenario that the arguments describe; the end of any of them ends the launch."""
+    """List the nodes of the scenario that the arguments describe; whatever is wrong is said before any is started."""
     value = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
-    file = value["scenario"]
-    scenario = scenarios.load(Path(file)) if file else scenarios.load_track(value["track"])
-    if value["surface"]:
-        scenario = scenarios.with_surface(scenario, value["surface"])
-    settings = {
-        "predictor.name": value["predictor"],
-        "seed": value["seed"],
-        "world.camera.mode": value["camera"],
-        "world.real_time_factor": value["real_time_factor"],
-    }
-    named = [f"{key}={text}" for key, text in settings.items() if text]
-    scenario = scenarios.override(scenario, [*named, *value["set"].split()])
-    scenario.check()
+    scenario = scenario_of(value)
     bag = Path(value["bag"]).absolute() if value["bag"] else None
-    started = [
-        Node(
-            package="robot_formation",
-            executable=process.executable,
-            namespace=process.namespace,
-            parameters=[process.ros_parameters()],
-            output="screen",
-            on_exit=Shutdown(reason=f"{process.name} has ended"),
-        )
-        for process in processes(scenario, bag, images=is_true(value["images"]))
-    ]
-    return [*started, rviz()] if is_true(value["rviz"]) else started
+    if bag is not None:
+        check_free(bag)
+    viewer = is_true(value["rviz"])
+    if viewer:
+        check_viewer()
+    environment = discovery(value["discovery_range"], context.environment)
+    namespace = value["namespace"]
+    table = processes(scenario, bag, images=is_true(value["images"]), namespace=namespace)
+    table.append(progress(scenario, namespace))
+    run = LaunchedRun(len(table), str(bag or ""))
+    started: list[Node] = []
+    started += [node(process, environment, on_exit(run, process, started)) for process in table]
+    if viewer:
+        pushed = names.absolute("", context.launch_configurations.get("ros_namespace", ""))
+        seeing = viewer_environment(environment, context.environment)
+        started.append(rviz(names.absolute(pushed, namespace), seeing))
+    context.extend_globals({RUNS: [*runs(context), run]})
+    return started
 
 
-def is_true(text: str) -> bool:
-    """Read a switch as other launch files do."""
-    return text.lower() in ("true", "1")
+def check_viewer() -> None:
+    """Refuse to start without a viewer that is asked for: nodes that ran already would be left alone."""
+    try:
+        get_package_prefix("rviz2")
+    except PackageNotFoundError:
+        raise FormationError("rviz:=true needs the package rviz2, which is not installed; leave it out") from None
 
 
-def rviz() -> Node:
+def runs(context: LaunchContext) -> list[LaunchedRun]:
+    """List the runs that were launched together."""
+    found: list[LaunchedRun] = getattr(context.locals, RUNS, [])
+    return found
+
+
+def node(process: Process, environment: dict[str, str], ended: Callable[..., Any]) -> Node:
+    """Make the action that starts a process of the table; as long as the recorder may take, so may all."""
+    sigterm_s, sigkill_s = map(str, RECORDER_PATIENCE_S)
+    return Node(
+        package=PACKAGE,
+        executable=process.executable,
+        namespace=process.namespace,
+        parameters=[process.ros_parameters()],
+        additional_env=environment,
+        output="screen",
+        on_exit=ended,
+        sigterm_timeout=sigterm_s,
+        sigkill_timeout=sigkill_s,
+    )
+
+
+def on_exit(run: LaunchedRun, process: Process, nodes: list[Node]) -> Callable[..., Any]:
+    """Make the handler of a process's end: the first end ends the run's other nodes, the last one says how it went."""
+
+    def handle(event: Any, context: LaunchContext) -> list[Any]:
+        if run.ended(process.name, process.executable, event.returncode, stopping=context.is_shutdown):
+            return [EmitEvent(event=ShutdownProcess(process_matcher=matches_action(other))) for other in nodes]
+        return conclusion(run, runs(context)) if run.complete else []
+
+    return handle
+
+
+def conclusion(run: LaunchedRun, together: list[LaunchedRun]) -> list[Any]:
+    """Say how a run has ended; the launch ends with the last of those that were launched together."""
+    if not all(other.complete for other in together):
+        return [LogInfo(msg=str(run))]
+    said = [] if run.failed else [LogInfo(msg=str(run))]
+    failed = "; ".join(str(other) for other in together if other.failed)
+    if failed:  # an exception is what makes launch end with exit code 1; here it leaves nobody behind
+        return [*said, OpaqueFunction(function=fail, args=[failed])]
+    return [*said, EmitEvent(event=Shutdown(reason="the run has ended"))]
+
+
+def fail(context: LaunchContext, text: str) -> None:
+    """Make the launch fail."""
+    raise FormationError(text)
+
+
+def rviz(namespace: str, environment: dict[str, str]) -> Node:
     """Make the viewer, with the displays of a formation."""
     return Node(
         package="rviz2",
         executable="rviz2",
-        arguments=["-d", str(config_dir() / "formation.rviz")],
+        arguments=["-d", str(rviz_config())],
         parameters=[{"use_sim_time": True}],
+        remappings=rviz_remappings(namespace),
+        additional_env=environment,
     )
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Declare the arguments, keep discovery on this machine unless told otherwise, and start the nodes."""
-    arguments = [
-        DeclareLaunchArgument(name, default_value=d, description=text) for name, (d, text) in ARGUMENTS.items()
+    """Declare the arguments and start the nodes."""
+    declared = [
+        DeclareLaunchArgument(
+            name,
+            default_value=argument.default,
+            description=argument.description,
+            choices=list(argument.choices) if argument.choices else None,
+        )
+        for name, argument in ARGUMENTS.items()
     ]
-    discovery = SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", LaunchConfiguration("discovery_range"))
-    return LaunchDescription([*arguments, discovery, OpaqueFunction(function=nodes)])
+    return LaunchDescription([*declared, OpaqueFunction(function=nodes)])

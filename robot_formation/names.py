@@ -1,7 +1,7 @@
 """Every topic, frame and quality of service in one place.
 
-Names are relative: a robot's nodes run in the robot's namespace, the world and the recorder in the run's. What belongs
-to the formation as a whole lies under the namespace given by the parameter `formation` (default `/formation`).
+Names are relative: a robot's nodes run in the robot's namespace, the world and the recorder in the one that the robots'
+lie in, the formation's. The done ticks lie under the parameter `formation_namespace`, by default `formation` there.
 """
 
 from __future__ import annotations
@@ -76,6 +76,11 @@ def under(prefix: str, name: str) -> str:
     return f"{prefix}/{name}" if prefix else name
 
 
+def absolute(namespace: str, name: str) -> str:
+    """Name a topic or a namespace in full: in a namespace ('' or '/': the root), unless it is absolute already."""
+    return name if name.startswith("/") else f"{namespace.rstrip('/')}/{name}"
+
+
 def joint_commands(robot: str = "") -> Topic:
     """Relative wheel rotations for a robot (drive to world)."""
     return Topic(under(robot, "joint_commands"), "sensor_msgs/msg/JointState", listeners=("world",))
@@ -140,7 +145,9 @@ SURFACE = Topic("surface", "visualization_msgs/msg/Marker", LATCHED)
 OVERHEAD_IMAGE = Topic("overhead/image_raw", IMAGE_TYPE, listeners=("overhead_tracker",))
 OVERHEAD_INFO = Topic("overhead/camera_info", "sensor_msgs/msg/CameraInfo", LATCHED)
 OVERHEAD_POSES = Topic("overhead/poses", "geometry_msgs/msg/PoseArray")
-CLOCK_TOPIC = Topic("/clock", "rosgraph_msgs/msg/Clock", CLOCK)
+CLOCK_TOPIC = Topic("clock", "rosgraph_msgs/msg/Clock", CLOCK)
+# The one that nodes with use_sim_time hear, wherever they are.
+ROS_CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", CLOCK)
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", STATUS)
 MOVE = Topic("move", "geometry_msgs/msg/PoseStamped", listeners=("drive",))
 MOVED = Topic("moved", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ())
@@ -152,6 +159,7 @@ RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", HIST
 COMMANDED = Topic("commanded", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
 PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("fine_tuner",))
 ALIGNMENT = Topic("alignment", "std_msgs/msg/String", HISTORY)
-# Only in bags, where the recorder makes them of ground truth and robot descriptions: tf2_msgs is not on pip.
-TF = Topic("/tf", "tf2_msgs/msg/TFMessage")
-TF_STATIC = Topic("/tf_static", "tf2_msgs/msg/TFMessage", LATCHED)
+# Made of ground truth and robot descriptions: by the world where tf2_msgs is installed (it is not on pip), else by the
+# recorder. In the formation's namespace, since formations have frames of the same names.
+TF = Topic("tf", "tf2_msgs/msg/TFMessage")
+TF_STATIC = Topic("tf_static", "tf2_msgs/msg/TFMessage", LATCHED)

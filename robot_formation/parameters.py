@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from robot_formation.errors import FormationError
+from robot_formation.errors import FormationError, shown
 
 T = TypeVar("T")
 
@@ -26,6 +26,8 @@ _ELEMENTS: dict[Any, type] = {
     tuple[str, ...]: str,
 }
 
+_LONGEST_NAME = 100
+_LISTED = 240  # characters
 _EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
 
 
@@ -35,7 +37,10 @@ class ParameterError(FormationError):
 
 @dataclass(frozen=True)
 class Spec:
-    """One parameter: dotted name, Python type, default, unit, closed range or choices, description."""
+    """One parameter: dotted name, Python type, default, unit, closed range or choices, description.
+
+    `known` lists names that it can have where whoever uses them looks them up, and complains.
+    """
 
     name: str
     type: Any
@@ -45,6 +50,7 @@ class Spec:
     high: float | None
     choices: tuple[Any, ...]
     description: str
+    known: tuple[str, ...] = ()
 
 
 def parameter(
@@ -55,9 +61,10 @@ def parameter(
     low: float | None = None,
     high: float | None = None,
     choices: tuple[Any, ...] = (),
+    known: tuple[str, ...] = (),
 ) -> Any:
-    """Make a dataclass field that carries its unit, closed range [low, high] or choices, and description."""
-    metadata = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices}
+    """Make a dataclass field that carries what `Spec` lists: unit, closed range [low, high] or choices, description."""
+    metadata = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices, "known": known}
     return dataclasses.field(default=default, metadata=metadata)
 
 
@@ -82,19 +89,34 @@ def specs(cls: type, prefix: str = "", *, defaults: Any = None) -> dict[str, Spe
         meta = field.metadata
         default = field.default if defaults is None else getattr(defaults, field.name)
         found[name] = Spec(
-            name, kind, default, meta["unit"], meta["low"], meta["high"], tuple(meta["choices"]), meta["description"]
+            name,
+            kind,
+            default,
+            meta["unit"],
+            meta["low"],
+            meta["high"],
+            tuple(meta["choices"]),
+            meta["description"],
+            tuple(meta["known"]),
         )
     return found
 
 
-def flatten(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Turn nested mappings into one with dotted names."""
+def flatten(values: Mapping[str, Any], prefix: str = "", *, where: str = "parameters") -> dict[str, Any]:
+    """Turn nested mappings into one with dotted names; `where` they stand is for messages.
+
+    Raises:
+        ParameterError: if a name is given twice, nested and with dots.
+    """
     flat: dict[str, Any] = {}
     for key, value in values.items():
-        if isinstance(value, Mapping):
-            flat.update(flatten(value, f"{prefix}{key}."))
-        else:
-            flat[f"{prefix}{key}"] = value
+        inner = (
+            flatten(value, f"{prefix}{key}.", where=where) if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+        )
+        for name in inner:
+            if name in flat:
+                raise ParameterError(f"{where}: '{name}' is given twice, nested and with dots; keep one of them")
+        flat.update(inner)
     return flat
 
 
@@ -122,7 +144,7 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], *, where: str) -> T:
         ParameterError: on an unknown name, a wrong type, or a value outside its range or choices.
     """
     known = specs(cls)
-    flat = flatten(values)
+    flat = flatten(values, where=where)
     for name in flat:
         if name not in known:
             raise ParameterError(f"{where}: no parameter '{name}'{suggestion(name, known)}")
@@ -130,33 +152,53 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], *, where: str) -> T:
 
 
 def suggestion(name: str, known: typing.Iterable[str]) -> str:
-    """Say which known name was probably meant, or list what there is."""
+    """Say which known name was probably meant, whatever its case, or list what there is."""
     candidates = list(known)
-    near = difflib.get_close_matches(name, candidates, n=1)
-    if not near:
+    name = name[:_LONGEST_NAME]  # finding what is near takes the square of the length
+    folded = {candidate.casefold(): candidate for candidate in reversed(candidates)}
+    near = [folded[match] for match in difflib.get_close_matches(name.casefold(), folded, n=1)]
+    if not near and name:
         near = [c for c in candidates if c.rsplit(".", 1)[-1] == name.rsplit(".", 1)[-1]][:1]
     if near:
         return f"; did you mean '{near[0]}'?"
-    return "; there are: " + ", ".join(sorted(candidates)) if candidates else ""
+    return "; there are: " + _listed(sorted(candidates)) if candidates else ""
+
+
+def _listed(candidates: list[str]) -> str:
+    """List names, as many as fit into a message."""
+    listed = list(candidates)
+    while len(", ".join(listed)) > _LISTED:
+        listed.pop()
+    rest = len(candidates) - len(listed)
+    return ", ".join(listed) + (f" and {rest} more" if rest else "")
 
 
 def check(spec: Spec, value: Any, *, where: str) -> Any:
     """Return the value in the parameter's type, or raise ParameterError."""
+    return check_as(spec, value, f"{where}: '{spec.name}'")
+
+
+def check_as(spec: Spec, value: Any, subject: str) -> Any:
+    """Return the value in the parameter's type; errors begin with the subject, like an option of the command line.
+
+    Raises:
+        ParameterError: on a wrong type, or a value outside the range or the choices.
+    """
     if spec.type in _ELEMENTS:
         if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
-            raise ParameterError(f"{where}: '{spec.name}' must be a list, not {value!r}")
-        items = tuple(_check_one(spec, _ELEMENTS[spec.type], item, where) for item in value)
+            raise ParameterError(f"{subject} must be a list, not {shown(value)}")
+        items = tuple(_check_one(spec, _ELEMENTS[spec.type], item, subject) for item in value)
         if spec.default and not items:
-            raise ParameterError(f"{where}: '{spec.name}' must not be empty")
+            raise ParameterError(f"{subject} must not be empty")
         return items
     kind = spec.type
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
         raise TypeError(f"{spec.name}: optional parameters are not supported; use a neutral default")
-    return _check_one(spec, kind, value, where)
+    return _check_one(spec, kind, value, subject)
 
 
-def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
-    wrong = ParameterError(f"{where}: '{spec.name}' must be of type {kind.__name__}, not {value!r}")
+def _check_one(spec: Spec, kind: type, value: Any, subject: str) -> Any:
+    wrong = ParameterError(f"{subject} must be of type {kind.__name__}, not {shown(value)}")
     if kind is float and isinstance(value, str) and _EXPONENT.fullmatch(value):
         value = float(value)  # YAML 1.1 takes 1e3, without a dot, for text
     if kind is float:
@@ -167,7 +209,7 @@ def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
         except OverflowError:  # a whole number of more than 308 digits
             value = math.inf
         if not math.isfinite(value):
-            raise ParameterError(f"{where}: '{spec.name}' must be finite, not {value!r}")
+            raise ParameterError(f"{subject} must be finite, not {shown(value)}")
     elif kind is int:
         if isinstance(value, bool) or not isinstance(value, int):
             raise wrong
@@ -175,11 +217,11 @@ def _check_one(spec: Spec, kind: type, value: Any, where: str) -> Any:
         raise wrong
     if spec.choices and value not in spec.choices:
         hint = suggestion(str(value), [str(c) for c in spec.choices])
-        raise ParameterError(f"{where}: '{spec.name}' can't be {value!r}{hint}")
+        raise ParameterError(f"{subject} can't be {shown(value)}{hint}")
     low, high = spec.low, spec.high
     if (low is not None and value < low) or (high is not None and value > high):
         limits = f"{'-inf' if low is None else low} to {'inf' if high is None else high} {spec.unit}".rstrip()
-        raise ParameterError(f"{where}: '{spec.name}' is {value!r}, outside {limits}")
+        raise ParameterError(f"{subject} is {shown(value)}, outside {limits}")
     return value
 
 

@@ -50,4 +50,5 @@ def pattern(face: Face) -> NDArray[np.bool_]:
     Raises:
         TagError: if this OpenCV has no such tags.
     """
-    return np.asarray(cv2.aruco.generateImageMarker(dictionary(), int(face), MODULES)) > 127
+    tags = dictionary()
+    return np.asarray(cv2.aruco.generateImageMarker(tags, int(face), MODULES)) > 127

@@ -3,11 +3,20 @@
 `pytest --hypothesis-profile=default` looks for new cases instead.
 """
 
+import os
+
 import pytest
 from hypothesis import settings
 
+from robot_formation.loopback import PROFILES
+from robot_formation.paths import config_dir
+
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
+
+# A middleware reads its profiles once in a process, when a test first joins a graph.
+for variable in PROFILES:
+    os.environ.setdefault(variable, str(config_dir() / "loopback.xml"))
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import time
 
 import pytest
 import rclpy
+from graph_tools import STRICT
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -15,8 +16,8 @@ from std_srvs.srv import Trigger
 
 from robot_formation import conversions
 from robot_formation.experiment.domain import DomainReservation
-from robot_formation.experiment.in_process import absolute
 from robot_formation.launching.environment import node_environment
+from robot_formation.names import absolute
 from robot_formation.nodes.host import qos_profile
 
 DEADLINE_S = 90.0  # long enough for a machine that others keep busy
@@ -50,7 +51,7 @@ class Lab:
 
     def start(self, name, *arguments, namespace="/"):
         command = [sys.executable, "-m", f"robot_formation.nodes.{name}", "--ros-args", "-r", f"__ns:={namespace}"]
-        return self.open([*command, *arguments], self.environment)
+        return self.open([*command, *arguments], {**self.environment, **STRICT})
 
     def open(self, command, environment, cwd=None):
         """Start a process in a session of its own, as a terminal would."""

@@ -14,6 +14,14 @@ from robot_formation.launching.launcher import Launcher
 
 SHORT = ("leader.timesteps=4", "world.camera.mode=on_demand")
 
+STRICT = {
+    "PYTHONDEVMODE": "1",
+    "PYTHONMALLOC": "default",  # without the checks of memory, which are about C code, and slow
+    # The ROS wheels' parser of message definitions (lark-parser 0.12) imports modules of Python that are to go.
+    "PYTHONWARNINGS": "error,ignore:module 'sre_:DeprecationWarning",
+}
+"""Python's development mode, and warnings as errors; one about a file left open only is printed."""
+
 
 def short_scenario(*settings, track="two", seed=3):
     """A scenario of a few timesteps."""
@@ -34,9 +42,12 @@ def launch(scenario, bag, **options):
 
 
 def formation(*arguments, timeout=300, **options):
-    """Call the command line as a user does."""
+    """Call the command line as a user does; neither it nor a node that it starts may give a Python warning."""
     command = [sys.executable, "-m", "robot_formation.cli.main", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False, **options)
+    options["env"] = {**options.get("env", os.environ), **STRICT}
+    completed = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False, **options)
+    assert "Warning" not in completed.stderr
+    return completed
 
 
 def json_of(completed):

@@ -16,6 +16,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch import LaunchDescription
 from robot_formation.experiment.scenario import load_track
 from robot_formation.launching.processes import processes
+from robot_formation.loopback import use_loopback
 from robot_formation.paths import share_dir
 
 FILE = share_dir() / "launch" / "formation.launch.py"
@@ -32,6 +33,7 @@ def generate_test_description():
 class WhileItRuns(unittest.TestCase):
     def setUp(self):
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"  # as the launch file's default
+        use_loopback(os.environ)  # as its nodes
         self.context = rclpy.Context()
         rclpy.init(context=self.context)
         self.node = rclpy.create_node("_witness", context=self.context)

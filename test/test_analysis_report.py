@@ -85,7 +85,11 @@ def test_the_verb_prints_the_table_and_draws_pictures_beside_the_bag(bag, capsys
 def test_json_is_alone_on_standard_output_and_draws_only_when_told_where(bag, tmp_path, capsys):
     assert run_verb(bag, "--json") == 0
     said = capsys.readouterr()
-    assert list(json.loads(said.out)) == ["scenario", "outcome", "timesteps", "totals"]
+    found = json.loads(said.out)
+    assert list(found)[:4] == ["scenario", "outcome", "timesteps", "totals"]
+    assert (found["seed"], found["predictor"], found["surface"], found["bag"]) == (3, "measured", "bowl", str(bag))
+    assert found["pictures"] == []
+    assert set(found["conditions"].values()) == {None}  # this bag doesn't say its parameters
     assert said.err == ""
     assert not bag.with_name("run_analysis").exists()
     assert run_verb(bag, "--json", "--out", tmp_path / "pictures") == 0

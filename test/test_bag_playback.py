@@ -10,7 +10,8 @@ from synthetic_bag import STORE, text
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.playback import Playhead, Prefetch, ScheduleErrors, make_excerpt
 from robot_formation.bag.qos import TopicQos
-from robot_formation.bag.reader import RawMessage, read_bag
+from robot_formation.bag.reader import read_bag
+from robot_formation.bag.source import RawMessage
 from robot_formation.bag.writer import BagWriter
 
 STRING = "std_msgs/msg/String"

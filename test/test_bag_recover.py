@@ -8,8 +8,9 @@ from rosbags.highlevel import AnyReader
 from synthetic_bag import STORE, text
 
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.folder import bag_name
 from robot_formation.bag.qos import TopicQos
-from robot_formation.bag.reader import bag_name, read_bag
+from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import recover
 from robot_formation.bag.writer import BagWriter
 
@@ -174,11 +175,11 @@ def make_bad(tmp_path, kind):
         ("file", "is not a bag"),
         ("folder", "is not a bag"),
         ("empty file", "seems to be empty"),
-        ("no mcap", "magic is invalid"),
-        ("other mcap", "Profile is not ros2"),
+        ("no mcap", "is no MCAP file"),
+        ("other mcap", "profile is .x-other., not that of ROS 2"),
         ("no messages", "is empty"),
         ("nothing saved", "no message that can be read"),
-        ("metadata", "Could not load YAML"),
+        ("metadata", "no valid YAML in line 2"),
     ],
 )
 def test_bad_bags_are_told_in_one_line(tmp_path, kind, says):

@@ -7,6 +7,7 @@ from graph_tools import short_scenario
 from rosbags.highlevel import AnyReader
 from synthetic_bag import STORE, odometry, text
 
+from robot_formation.bag.errors import BagError
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import Recorder
@@ -141,3 +142,37 @@ def test_a_closed_chunk_has_its_transforms(tmp_path):
     recorder.end_chunk()
     assert len(messages_of(tmp_path / "bag.partial", "/tf")) == 1
     recorder.close()
+
+
+def test_a_publisher_that_appears_while_transforms_are_made_is_recorded_beside_them(tmp_path):
+    foreign = STORE.types["tf2_msgs/msg/TFMessage"]([])
+    with_robot = Recorder(tmp_path / "bag", {})
+    with_robot.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
+    with_robot.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(10**9, 1.0, 0.0, 0.0)))
+    with_robot.end_chunk()
+    with_robot.add_topic("/tf", "tf2_msgs/msg/TFMessage", TopicQos())
+    with_robot.record("/tf", "tf2_msgs/msg/TFMessage", cdr(foreign))
+    with_robot.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(2 * 10**9, 1.0, 0.0, 0.0)))
+    with_robot.close()
+    found = [[entry.child_frame_id for entry in m.message.transforms] for m in messages_of(tmp_path / "bag", "/tf")]
+    assert sorted(found) == [[], ["base_link"], ["base_link"]]
+
+
+def test_a_topic_of_the_recorders_own_keeps_its_type(tmp_path):
+    recorder = Recorder(tmp_path / "bag", {})
+    recorder.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
+    recorder.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(10**9, 1.0, 0.0, 0.0)))
+    recorder.end_chunk()
+    with pytest.raises(BagError, match="added before"):
+        recorder.add_topic("/tf", STRING, TopicQos())
+    recorder.close()
+
+
+def test_each_formations_transforms_lie_in_its_namespace():
+    made = Transforms()
+    for namespace, x in (("", 0.1), ("/site_a", 0.2)):
+        message = odometry(0, x, 0.2, 0.3)
+        message.child_frame_id = "leader/base_link"
+        made.take(f"{namespace}/ground_truth/leader/odom", ODOMETRY, cdr(message), 0)
+    places = {name: message.transforms[0].transform.translation.x for name, message, _ in decoded(made.make())}
+    assert places == {"/tf": 0.1, "/site_a/tf": 0.2, "/tf_static": 0.1, "/site_a/tf_static": 0.2}

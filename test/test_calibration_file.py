@@ -133,8 +133,8 @@ def test_a_run_says_and_records_which_curves_it_uses(file):
         ("robots: {leader: {v: [0, 33, -200]}}", "doesn't rise"),
         ("robots: {leader: {v: [-9, 33]}}", "doesn't rise"),
         ("robots: {leader: {v: [0, 33]}}\nmeasured_with: 3", "measured_with"),
-        ("a: [1", "no YAML"),
-        ("robots: !!python/object/apply:os.system ['true']", "no YAML"),
+        ("a: [1", "no valid YAML"),
+        ("robots: !!python/object/apply:os.system ['true']", "no valid YAML"),
     ],
 )
 def test_a_wrong_file_is_one_line_that_names_it(tmp_path, text, words):

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -66,18 +67,30 @@ def test_info_tells_the_figures_of_ros2_bag_info(bag, capsys):
     said = told(capsys, "info", bag)
     for words in ("bag_0.mcap", "mcap, compression zstd", "jazzy", "9.000000000s", "scenario:          two"):
         assert words in said
+    assert "1970-01-01 00:00:09 UTC (9.000000000), simulated time" in said
     assert f"/words | Type: {STRING} | Count:      10 | QoS: reliable transient local" in said
 
 
 def test_info_as_json(bag, capsys):
     found = json.loads(told(capsys, "info", bag, "--json"))
     assert (found["messages"], found["start_ns"], found["end_ns"], found["duration_s"]) == (10, 0, 9 * SECOND, 9.0)
+    assert found["simulated_time"] is True
     assert (found["closed"], found["storage"], found["ros_distro"]) == (True, "mcap", "jazzy")
     assert found["metadata"] == {"scenario": "two", "parameters": {"leader": {"timesteps": 4}}}
     (topic,) = found["topics"]
     assert (topic["name"], topic["type"], topic["messages"]) == ("/words", STRING, 10)
     assert topic["type_hash"] == STORE.hash_rihs01(STRING)
     assert topic["offered_qos_profiles"][0]["durability"] == "transient_local"
+
+
+@pytest.mark.parametrize("dates_s", [(1_700_000_000,), ()])
+def test_dates_of_a_clock_and_an_empty_bag_are_not_called_simulated(tmp_path, capsys, dates_s):
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic("/words", STRING, TopicQos())
+        for date_s in dates_s:
+            writer.write("/words", cdr("word"), date_s * SECOND)
+    assert json.loads(told(capsys, "info", tmp_path / "bag", "--json"))["simulated_time"] is False
+    assert "simulated" not in told(capsys, "info", tmp_path / "bag")
 
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
@@ -110,6 +123,7 @@ def test_analyze_reads_a_run_in_a_bag_of_another_make(tmp_path, capsys):
                 connections[message.topic] = theirs.add_connection(message.topic, message.type_name, typestore=STORE)
             theirs.write(connections[message.topic], message.stamp_ns, message.cdr)
     results = [json.loads(told(capsys, "analyze", tmp_path / name, "--json")) for name in ("ours", "theirs")]
+    assert [Path(result.pop("bag")).name for result in results] == ["ours", "theirs"]
     assert results[0] == results[1]
 
 

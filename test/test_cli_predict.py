@@ -104,6 +104,15 @@ def test_predictors_come_in_the_order_named_once_each(capsys, log):
     assert list(forecasts(capsys, log, *options)) == ["ewma+close", "previous"]
 
 
+@pytest.mark.parametrize("option", ["--predictors", "--predictor"])
+def test_predictors_may_be_listed_with_commas(capsys, log, option):
+    assert list(forecasts(capsys, log, option, "ewma+close,previous", option, "previous,literal")) == [
+        "ewma+close",
+        "previous",
+        "literal",
+    ]
+
+
 def test_parameters_are_those_of_run(capsys, log):
     plain = forecasts(capsys, log, "--predictor", "ewma")["ewma"]
     last = forecasts(capsys, log, "--predictor", "ewma", "--set", "predictor.ewma.gain=1")["ewma"]
@@ -176,11 +185,11 @@ def test_displacements_beyond_the_bounds_of_forecasts_are_warned_of(capsys, tmp_
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--predictor", "mesured"], ["'mesured'", "did you mean 'measured'"]),
+        (["--predictor", "mesured"], ["--predictors: no predictor 'mesured'", "did you mean 'measured'"]),
         (["--set", "predictor.forgeting=0.9"], ["'forgeting'", "'forgetting'"]),
         (["--set", "predictor.forgetting=2"], ["forgetting", "outside"]),
         (["--set", "predicter.forgetting=0.9"], ["'predicter'", "'predictor'"]),
-        (["--set", "predictor.name=ewma"], ["--predictor"]),
+        (["--set", "predictor.name=ewma"], ["--predictors NAME"]),
         (["--set", "seed=3"], ["seed=3", "predictor."]),
         (["--set", "leader.timesteps=3"], ["leader.timesteps", "predictor."]),
         (["--set", "predictor.forgetting"], ["KEY=VALUE"]),

@@ -17,7 +17,7 @@ FAST = ("--camera", "on_demand", "--in-process")
     ("arguments", "words"),
     [
         (("run", "--track", "tow"), ["no track 'tow'", "'two'"]),
-        (("run", "--predictor", "mesured"), ["'mesured'", "'measured'"]),
+        (("run", "--predictor", "mesured"), ["--predictor can't be 'mesured'", "'measured'"]),
         (("run", "--surface", "bowel"), ["no surface 'bowel'", "'bowl'"]),
         (("run", "--camera", "streem"), ["'streem'", "'stream'"]),
         (("run", "--set", "predictor.forgeting=0.9"), ["'forgeting'", "'forgetting'"]),
@@ -29,10 +29,10 @@ FAST = ("--camera", "on_demand", "--in-process")
         (("run", "--set", "world.camera.min_frames_per_second=31"), ["min_frames_per_second", "240"]),
         (("run", "--set", "world.surface_parameters=[depth=1]"), ["depth"]),
         (("run", "--seed", "-1"), ["seed"]),
-        (("run", "--real-time-factor", "-1"), ["real_time_factor"]),
+        (("run", "--real-time-factor", "-1"), ["--real-time-factor", "outside"]),
         (("run", "--track", "one", "--scenario", "x.yaml"), ["not allowed with"]),
         (("run", "--scenario", "missing.yaml"), ["missing.yaml", "No such file"]),
-        (("rnu",), ["invalid choice"]),
+        (("rnu",), ["no verb 'rnu'", "'run'"]),
         (("analyze", "missing_bag"), ["missing_bag"]),
         (("analyze", __file__), ["bag"]),
     ],
@@ -88,7 +88,20 @@ def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(t
     if completed.returncode == 0:
         assert [row["t"] for row in run["timesteps"]] == list(range(1, (15 if track == "one" else 20) + 1))
     assert (bag / "metadata.yaml").is_file()
-    assert json_of(formation("analyze", bag, "--json")) == run
+    found = json_of(formation("analyze", bag, "--json"))
+    assert (run["conditions"].pop("in_process"), found["conditions"].pop("in_process")) == (True, None)
+    assert (run.pop("reason") is None) == (completed.returncode == 0)
+    assert found.pop("reason") is None
+    assert found == run
+    assert (run["bag"], run["pictures"], run["seed"]) == (str(bag), [], 3)
+    assert (run["predictor"], run["surface"]) == (predictor, "bowl")
+    assert run["conditions"] == {
+        "mode": "precise",
+        "camera": "on_demand",
+        "marker": "colours",
+        "followers": 1,
+        "drive_mode": "pwm_stop",
+    }
 
 
 @pytest.mark.graph
@@ -114,7 +127,7 @@ def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_pa
         assert sum(1 for _ in opened.messages(opened.topics)) == opened.message_count
         assert "/follower_1/blocks" in opened.topics
         assert "/follower_1/camera/image_raw" not in opened.topics
-        assert opened.metadata("robot_formation")["predictor"] == "measured"
+        assert opened.metadata("robot_formation")["predictor"] == "formation"
 
 
 @pytest.mark.graph
@@ -158,3 +171,45 @@ def test_a_closed_pipe_is_no_error(tmp_path):
         errors = process.stderr.read()
         process.wait()
     assert b"Traceback" not in errors
+
+
+def test_json_of_a_run_that_left_nothing_to_analyse_says_what_it_was_to_be_and_why_it_ended(
+    capsys, tmp_path, monkeypatch
+):
+    from robot_formation.cli import run
+    from robot_formation.experiment.run_result import RunResult
+
+    monkeypatch.setattr(run, "execute", lambda args, scenario, bag: RunResult(4, None, "world died"))
+    options = ("--seed", "5", "--surface", "plane", "--set", "followers=2", "--track", "one")
+    assert main(["run", "--json", "--bag", str(tmp_path / "bag"), *options]) == 4
+    said = capsys.readouterr()
+    assert said.err == "formation run: world died\n"
+    assert json.loads(said.out) == {
+        "scenario": "track_one",
+        "outcome": "incomplete",
+        "timesteps": [],
+        "totals": None,
+        "seed": 5,
+        "predictor": "formation",
+        "surface": "plane",
+        "conditions": {
+            "mode": "precise",
+            "camera": "stream",
+            "marker": "colours",
+            "followers": 2,
+            "drive_mode": "pwm_stop",
+            "in_process": False,
+        },
+        "bag": None,
+        "pictures": [],
+        "reason": "world died",
+    }
+
+
+def test_the_table_names_the_conditions_of_the_run(tmp_path, capsys):
+    bag = tmp_path / "bag"
+    options = ("--set", "leader.timesteps=1", "--set", "fine_tuner.mode=paper", "--set", "world.motor.drive_mode=pid")
+    assert main(["run", "--bag", str(bag), *options, *FAST]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == (
+        "track_two: predictor formation, surface bowl, seed 0, alignment paper, camera on_demand, drive pid"
+    )

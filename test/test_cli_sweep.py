@@ -10,12 +10,16 @@ import pytest
 
 from robot_formation import paths
 from robot_formation.cli.main import main
-from robot_formation.cli.sweep import default_folder, with_progress
+from robot_formation.cli.sweep import default_folder, seeds_text, with_progress
 from robot_formation.experiment import sweep
 from robot_formation.experiment.sweep import Row, Task
 
 CHOICE = ("--tracks", "two", "--surfaces", "plane", "--predictors", "previous,formation", "--seeds", "1000:1003")
 SHORT = ("--set", "leader.timesteps=4")
+ANNOUNCED = """\
+seeds 1000 to 1002 (3 seeds)
+warning: intervals say nothing with fewer than 5 seeds; 20 are --seeds 0:20
+"""
 
 
 @pytest.fixture
@@ -52,13 +56,26 @@ def test_json_is_all_of_standard_output_and_progress_goes_to_standard_error(caps
     code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
     assert code == 0
     found = json.loads(said.out)
-    assert list(found) == ["runs", "summary"]
+    assert list(found)[:2] == ["runs", "summary"]
+    assert (found["tracks"], found["surfaces"], found["seeds"]) == (["two"], ["plane"], [1000, 1001, 1002])
+    assert (found["predictors"], found["settings"]) == (["previous", "formation"], [])
+    assert found["conditions"] == {
+        "mode": "paper",
+        "camera": "on_demand",
+        "marker": "colours",
+        "followers": 1,
+        "drive_mode": "pwm_stop",
+        "in_process": True,
+    }
+    assert (found["bag"], found["pictures"], found["reason"]) == (None, [], None)
     assert found["runs"] == str(tmp_path / "out" / "runs.csv")
     assert [(entry["predictor"], entry["runs"]) for entry in found["summary"]] == [("previous", 3), ("formation", 3)]
     assert found["summary"][1]["reduction"]["median"] == pytest.approx(1.0 - 0.101 / 0.3)
     assert said.err.splitlines()[-1].startswith("6/6 runs, ")
     assert said.err.rstrip().endswith("per minute, 0:00 left")
-    assert json.loads((tmp_path / "out" / "summary.json").read_text()) == {"summary": found["summary"]}
+    written = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert written == {name: found[name] for name in written}
+    assert set(found) - set(written) == {"runs", "bag", "pictures", "reason"}
 
 
 def test_the_folder_holds_table_plan_and_both_summaries(capsys, tmp_path, made):
@@ -73,6 +90,9 @@ def test_the_folder_holds_table_plan_and_both_summaries(capsys, tmp_path, made):
     printed = (tmp_path / "a" / "b" / "summary.md").read_text()
     assert said.out.startswith(printed)
     assert "| two | plane | formation | 3 | 0 |" in printed
+    assert printed.splitlines()[-1] == (
+        "Conditions: alignment paper, camera on_demand, in one process; seeds 1000 to 1002 (3 seeds)"
+    )
     assert len(made) == 6
 
 
@@ -83,7 +103,7 @@ def test_without_out_a_new_folder_in_bags_is_made_each_time(capsys, tmp_path, ma
         assert call(capsys, *CHOICE, "--jobs", 1)[0] == 0
     names = ["sweep_20260101-120000", "sweep_20260101-120000_2", "sweep_20260101-120000_3"]
     assert sorted(path.name for path in (tmp_path / "bags").iterdir()) == names
-    assert default_folder().name == "sweep_20260101-120000_4"
+    assert default_folder().path.name == "sweep_20260101-120000_4"
     assert len(made) == 18
 
 
@@ -92,7 +112,7 @@ def test_a_finished_sweep_is_summarised_again_without_a_run(capsys, tmp_path, ma
     first = call(capsys, *arguments)[1].out
     made.clear()
     code, said = call(capsys, *arguments)
-    assert (code, said.out, said.err, made) == (0, first, "", [])
+    assert (code, said.out, said.err, made) == (0, first, ANNOUNCED, [])
 
 
 def test_the_summary_is_of_what_was_asked_for_though_the_table_holds_more(capsys, tmp_path, made):
@@ -138,7 +158,7 @@ def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(capsys, t
     made.clear()
     code, said = call(capsys, *arguments)
     assert code == 0
-    assert said.err.startswith(f"{tmp_path / 'out'}: 4 runs are there already, 2 are left\n")
+    assert said.err.startswith(f"{ANNOUNCED}{tmp_path / 'out'}: 4 runs are there already, 2 are left\n")
     assert made == [Task("two", "plane", "previous", 1002), Task("two", "plane", "formation", 1002)]
     resumed = (tmp_path / "out" / "runs.csv").read_bytes()
     call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "whole")
@@ -160,6 +180,37 @@ def test_a_run_that_fails_ends_the_sweep_with_one_line_and_keeps_the_others(caps
     assert sum(1 for _ in sweep.read_rows(tmp_path / "out" / "runs.csv")) == 3
 
 
+@pytest.mark.parametrize(
+    ("chosen", "text"),
+    [
+        ((5,), "1 seed: 5"),
+        ((0, 1, 2, 3, 4), "seeds 0 to 4 (5 seeds)"),
+        ((3, 4), "seeds 3 to 4 (2 seeds)"),
+        ((7, 0, 1, 9), "seeds 0 to 1, 7, 9 (4 seeds)"),
+        (tuple(range(0, 60, 3)), "seeds 0, 3, 6, 9, 12, 15, 18, 21, 24, ... 57 (20 seeds)"),
+    ],
+)
+def test_seeds_in_words(chosen, text):
+    assert seeds_text(chosen) == text
+
+
+def test_lists_that_are_repeated_add_up_and_names_count_once(capsys, tmp_path, made):
+    choice = ("--tracks", "two", "--tracks", "one,two", "--surfaces", "plane", "--surfaces", "bowl")
+    choice += ("--predictors", "previous", "--predictor", "ewma", "--seeds", "1:3", "--seeds", "2:4,9")
+    assert call(capsys, *choice, "--jobs", 1, "--out", tmp_path / "out")[0] == 0
+    assert {task.track for task in made} == {"one", "two"}
+    assert {task.surface for task in made} == {"plane", "bowl"}
+    assert {task.predictor for task in made} == {"previous", "ewma"}
+    assert {task.seed for task in made} == {1, 2, 3, 9}
+    assert len(made) == len(set(made)) == 2 * 2 * 2 * 4
+
+
+def test_with_five_seeds_nothing_is_warned_of(capsys, tmp_path, made):
+    said = call(capsys, *CHOICE[:-1], "0:5", "--jobs", 1, "--out", tmp_path / "out")[1]
+    assert "warning" not in said.err
+    assert said.err.startswith("seeds 0 to 4 (5 seeds)\n")
+
+
 def test_progress_passes_rows_on_and_tells_the_last_always(capsys):
     assert list(with_progress(iter("abc"), 3)) == ["a", "b", "c"]
     lines = capsys.readouterr().err.splitlines()
@@ -174,8 +225,6 @@ def test_progress_passes_rows_on_and_tells_the_last_always(capsys):
     [
         (["--tracks", "tow"], ["no track 'tow'", "'two'"]),
         (["--predictors", "previous,formaton"], ["no predictor 'formaton'", "'formation'"]),
-        (["--surfaces", ","], ["no surface is given"]),
-        (["--predictors", "previous, previous"], ["given twice"]),
         (["--seeds", "5:5"], ["--seeds 5:5 holds no seed"]),
         (["--seeds", "few"], ["--seeds takes FIRST:END"]),
         (["--jobs", "0"], ["--jobs is at least 1, not 0"]),
@@ -195,7 +244,17 @@ def test_a_folder_of_something_else_or_other_settings_and_a_file_are_refused(cap
     assert "is not empty and holds no sweep" in complaint(capsys, *CHOICE, "--out", tmp_path)
     assert "letter.txt" in complaint(capsys, *CHOICE, "--out", tmp_path / "letter.txt")
     call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out")
-    assert "other settings" in complaint(capsys, *CHOICE, *SHORT, "--out", tmp_path / "out")
+    line = complaint(capsys, *CHOICE, *SHORT, "--out", tmp_path / "out")
+    assert line.endswith("other settings: it was made without --set leader.timesteps=4; choose another --out")
+    call(capsys, *CHOICE, *SHORT, "--jobs", 1, "--out", tmp_path / "short")
+    other = ("--set", "leader.timesteps=5")
+    line = complaint(capsys, *CHOICE, *other, "--out", tmp_path / "short")
+    assert "made with --set leader.timesteps=4 and without --set leader.timesteps=5" in line
+    line = complaint(capsys, *CHOICE, "--out", tmp_path / "short")
+    assert "made with --set leader.timesteps=4;" in line
+    call(capsys, *CHOICE, *SHORT, *other, "--jobs", 1, "--out", tmp_path / "both")
+    line = complaint(capsys, *CHOICE, *other, *SHORT, "--out", tmp_path / "both")
+    assert "in another order, --set leader.timesteps=4 --set leader.timesteps=5;" in line
     assert (tmp_path / "letter.txt").read_text() == "dear reader"
 
 

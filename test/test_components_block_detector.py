@@ -49,6 +49,18 @@ def blocks_in(sent):
     return conversions.read_blocks(message)
 
 
+def test_pictures_of_one_time_taken_by_two_sensors_have_no_rate(signatures, wire):
+    parameters = KINDS["block_detector"].parameter_class()
+    wire.give(IMAGE, image(SQUARE, 2))
+    for sensor in ("tags", "colours"):
+        wire.component.set_parameters(
+            from_mapping(parameters, {"sensor": sensor, "signatures_file": signatures}, where="test")
+        )
+        wire.give(IMAGE, image(SQUARE, 2))
+    assert counted(wire) == ("3", "0")
+    assert wire.component.details()["frame_rate_hz"] == ""
+
+
 def test_a_picture_is_answered_with_its_blocks_its_stamp_and_its_frame(wire):
     assert blocks_in(wire.give(IMAGE, image(SQUARE, 2))) == []
     ((_, message),) = sent = wire.give(IMAGE, image(SQUARE, 3))

@@ -21,7 +21,7 @@ def report(motion, stamp_ns):
 
 @pytest.fixture
 def wire():
-    return wired("predictor", "follower_1")
+    return wired("predictor", "follower_1", name="measured")
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["displacement first", "residual first"])
@@ -101,6 +101,24 @@ def test_a_displacement_without_an_estimate_is_left_out_and_answered_from_what_i
     assert conversions.read_displacement(message) == Motion(0.05, 0.01)
     assert "without an estimate" in wire.warnings[0]
     assert wire.component.details()["timesteps"] == "1"
+
+
+def test_a_displacement_that_is_not_finite_is_warned_of_at_once(wire):
+    wire.give("displacement", report(Motion(math.inf, 0.0), 2)[0])
+    assert "displacement: (-0.0, inf) m is not finite" in wire.warnings[0]
+
+
+@pytest.mark.parametrize("topic", [0, 1])
+def test_halves_that_never_become_pairs_are_forgotten_with_a_warning(wire, topic):
+    name = ("displacement", "residual")[topic]
+    for stamp_ns in range(100):
+        assert wire.give(name, report(Motion(0.05), stamp_ns)[topic]) == []
+    assert len(wire.component._parts) == 16
+    assert len(wire.warnings) == 84
+    assert wire.warnings[0] == f"{name} of 0 ns came without the rest of the timestep and is forgotten"
+    other = ("residual", "displacement")[topic]
+    assert wire.give(other, report(Motion(0.05), 0)[1 - topic]) == []
+    assert len(wire.give(other, report(Motion(0.05), 99)[1 - topic])) == 1
 
 
 # --- commanded ------------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from component_helpers import wired
+from tag_helpers import needs_tags
 
 from robot_formation import conversions
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
@@ -47,7 +48,7 @@ class Bench:
         return self.wire(**values).component._detector
 
 
-@pytest.fixture(params=["colours", "tags"], scope="module")
+@pytest.fixture(params=["colours", pytest.param("tags", marks=needs_tags)], scope="module")
 def bench(request):
     return Bench(request.param)
 
@@ -79,6 +80,7 @@ def test_in_formation_the_target_face_is_a_block_of_50_px_50_px_above_the_centre
     assert (block.width, block.height) == pytest.approx((50, 50), abs=4.0)
 
 
+@needs_tags
 @pytest.mark.parametrize(("yaw", "faces"), [(-0.7, {TARGET, FRONT}), (0.7, {TARGET, REAR})])
 def test_signatures_name_the_same_faces_and_boxes_nearly_agree(bench, wire, yaw, faces):
     found = bounding_boxes(second_look(wire, bench.picture(0.0, 0.34, yaw)))
@@ -163,6 +165,7 @@ def changed(component, **values):
     component.set_parameters(from_mapping(BlockDetectorNodeParameters, {**defaults, **values}, where="test"))
 
 
+@needs_tags
 def test_the_sensor_and_the_search_can_be_changed_while_the_node_runs():
     bench = Bench("tags")
     picture = bench.picture()
@@ -177,6 +180,7 @@ def test_the_sensor_and_the_search_can_be_changed_while_the_node_runs():
     assert second_look(wire, Bench("colours").picture(), 7)
 
 
+@needs_tags
 def test_a_tag_detector_reads_no_signatures(tmp_path):
     missing = str(tmp_path / "missing.yaml")
     assert Bench("tags").wire(signatures_file=missing)
@@ -217,6 +221,7 @@ def test_the_files_for_tags_differ_from_config_and_hold_known_parameters():
         assert any(values[name] != value for name, value in defaults.items() if name in values)
 
 
+@needs_tags
 @pytest.mark.parametrize("mode", ["paper", "precise"])
 def test_a_run_with_tags_comes_to_its_end_in_formation(mode):
     settings = ["marker=tags", f"fine_tuner.mode={mode}", "leader.timesteps=4", "seed=3"]

@@ -81,7 +81,9 @@ def test_a_reset_world_gives_the_same_run_as_a_fresh_one_at_later_stamps():
     used.component.work()
     before = used.component.stamp_ns
     used.sent.clear()
-    assert used.call("world/reset") == (True, f"seed 4, from {before // 10**9 + 1} s on")
+    done, text = used.call("world/reset")
+    assert done
+    assert text.startswith(f"seed 4, from {before // 10**9 + 1} s on; a run that was under way waits for ever: start")
     assert not used.component.busy
     start = used.component.stamp_ns
     assert start > before
@@ -109,6 +111,10 @@ def test_a_reset_says_again_what_a_late_joiner_needs_and_time_never_goes_back():
     used.stranger()
     clock = [conversions.to_ns(message.clock) for message in used.of("/clock")]
     assert clock == sorted(clock)
+
+
+def test_a_reset_before_anything_moved_asks_for_nothing():
+    assert Hosted(seed=4).call("world/reset") == (True, "seed 4, from 1 s on")
 
 
 def test_drives_and_detectors_need_no_restart_after_a_reset():

@@ -26,7 +26,7 @@ def run(tmp_path_factory):
     """The bag of a short run with pictures."""
     bag = tmp_path_factory.mktemp("replay") / "run"
     settings = ["seed=3", f"leader.timesteps={TIMESTEPS}", "world.camera.mode=on_demand", "predictor.forgetting=0.9"]
-    settings.append("fine_tuner.mode=paper")
+    settings += ["predictor.name=measured", "fine_tuner.mode=paper"]
     scenario = scenarios.override(scenarios.load_track("two"), settings)
     run_in_process(scenario, bag, run_metadata(scenario), images=True)
     return bag

@@ -17,6 +17,7 @@ from robot_formation.experiment.scenario import (
     override,
     presets,
     track_names,
+    with_option,
     with_surface,
 )
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
@@ -305,10 +306,10 @@ def test_a_wrong_file_is_answered_in_one_line_that_names_it(write, text, words):
 
 
 def test_a_missing_file_a_folder_and_a_picture_are_no_scenarios(tmp_path):
-    assert "can't read it: No such file" in one_line(load, tmp_path / "missing.yaml")
-    assert "can't read it" in one_line(load, tmp_path)
+    assert "can't be read (No such file" in one_line(load, tmp_path / "missing.yaml")
+    assert "can't be read" in one_line(load, tmp_path)
     (tmp_path / "picture.yaml").write_bytes(b"\x89PNG\xff\xfe")
-    assert "can't read it" in one_line(load, tmp_path / "picture.yaml")
+    assert "no text in UTF-8" in one_line(load, tmp_path / "picture.yaml")
 
 
 @pytest.mark.parametrize("text", ["", "- 1\n", "drive: {}\n", "'/**': 3\n", "'/**': {ros__parameters: 3}\n"])
@@ -316,3 +317,36 @@ def test_a_config_file_of_another_form_is_answered_with_the_form_it_needs(tmp_pa
     (tmp_path / "drive.yaml").write_text(text, encoding="utf-8")
     monkeypatch.setattr(module, "config_dir", lambda: tmp_path)
     assert re.search("drive.yaml: a ROS parameter file begins with", one_line(node_defaults, "drive"))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "source", "message"),
+    [
+        ("predictor.name", "mesured", "--predictor", "--predictor can't be 'mesured'; did you mean 'measured'?"),
+        ("predictor.name", "mesured", "predictor:=", "predictor:= can't be 'mesured'; did you mean 'measured'?"),
+        ("seed", -1, "--seed", "--seed is -1, outside 0 to 9223372036854775807"),
+        ("seed", "one", "seed:=", "seed:= must be of type int, not 'one'"),
+        ("seed", "[1", "seed:=", "seed:=: '[1' is no YAML value: did not find expected ',' or ']'"),
+        ("world.camera.mode", "streem", "--camera", "--camera can't be 'streem'; did you mean 'stream'?"),
+        ("world.real_time_factor", -1.0, "--real-time-factor", "--real-time-factor is -1.0, outside 0.0 to 1000.0"),
+    ],
+)
+def test_a_wrong_value_of_an_option_names_the_option_alone(key, value, source, message):
+    with pytest.raises(FormationError) as raised:
+        with_option(load_track("one"), key, value, source)
+    assert str(raised.value) == message
+
+
+def test_the_value_of_an_option_may_be_a_text():
+    scenario = with_option(load_track("one"), "seed", "7", "seed:=")
+    scenario = with_option(scenario, "world.real_time_factor", "2", "real_time_factor:=")
+    scenario = with_option(scenario, "world.camera.mode", "on_demand", "camera:=")
+    assert scenario.setup.seed == 7
+    world = scenario.parameters("world")
+    assert (world["real_time_factor"], world["camera.mode"]) == (2.0, "on_demand")
+
+
+@pytest.mark.parametrize("setting", ["sed=3", "predicter.name=x", "predictor.nam=x", "seed", "seed=[1", "seed=x"])
+def test_a_wrong_setting_names_where_it_was_written(setting):
+    with pytest.raises(FormationError, match=r"^set:="):
+        override(load_track("one"), [setting], source="set:=")

@@ -90,7 +90,15 @@ def test_a_runs_conditions_are_the_papers_fine_tuner_and_pictures_on_demand():
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"), [("0:3", (0, 1, 2)), ("7", (7,)), ("1000:1001", (1000,)), ("0", (0,)), ("09:11", (9, 10))]
+    ("text", "expected"),
+    [
+        ("0:3", (0, 1, 2)),
+        ("7", (7,)),
+        ("7,3:5,4:6", (7, 3, 4, 5)),
+        ("1000:1001", (1000,)),
+        ("0", (0,)),
+        ("09:11", (9, 10)),
+    ],
 )
 def test_seeds_are_first_to_before_the_end_or_one(text, expected):
     assert seeds(text) == expected

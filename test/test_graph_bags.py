@@ -17,6 +17,7 @@ from synthetic_bag import STORE, text
 from test_bag_death import limit_file_size, ticks_in_finished_chunks, ticks_of
 
 from robot_formation import conversions, names
+from robot_formation.bag.info import bag_info
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import recover
@@ -115,7 +116,7 @@ def test_record_play_and_record_again_gives_the_same_messages_in_the_same_order(
         assert played["messages"] == 20 * 105
         assert set(played["schedule_error"]) == {"median_ms", "p99_ms", "worst_ms"}
         report = lab.end(recorder)
-        assert (report["dropped"], report["lost"]) == ({}, {})
+        assert (report["dropped"], report["lost"]) == ({}, {}), report["topics"]
         assert payloads(tmp_path / target) == payloads(tmp_path / source)
     with read_bag(tmp_path / "third") as bag:
         offered = {topic.name: topic.profiles[0] for topic in bag.contents}
@@ -194,6 +195,58 @@ def flood(lab, publisher, enough):
             else:
                 sent += 1
         lab.executor.spin_once(0.01)
+
+
+FLOOD = """
+import sys
+import rclpy
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import UInt32
+
+rclpy.init()
+node = rclpy.create_node("flood")
+qos = QoSProfile(depth=10, history=HistoryPolicy.KEEP_LAST, reliability=ReliabilityPolicy.RELIABLE)
+publisher = node.create_publisher(UInt32, "/tick", qos)
+while not publisher.get_subscription_count():
+    pass
+for number in range(int(sys.argv[1])):
+    publisher.publish(UInt32(data=number))
+publisher.wait_for_all_acked()
+print("sent", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_messages_lost_in_a_flood_are_told_and_the_bag_is_whole(lab, tmp_path):
+    sent = 60_000
+    recorder = lab.record("/tick", "-o", tmp_path / "bag")
+    source = subprocess.Popen(
+        [sys.executable, "-c", FLOOD, str(sent)],
+        env=lab.environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    lab.processes.append(source)
+    assert source.stdout.readline() == "sent\n"
+    report = lab.end(recorder)
+    found = ticks_of(tmp_path / "bag")
+    assert found == sorted(set(found))
+    assert found[-1] == sent - 1
+    # What was sent before the first message that arrived was no loss: nobody had subscribed.
+    assert report["messages"] == len(found)
+    assert report["lost"].get("/tick", 0) == sent - found[0] - len(found)
+    assert bag_info(tmp_path / "bag").to_mapping()["metadata"].get("lost", {}) == report["lost"]
+
+
+def test_a_type_that_is_not_that_of_a_topic_made_by_the_recorder_is_told(lab, tmp_path):
+    recorder = lab.record("/tf", "/words", "-o", tmp_path / "bag")
+    publishers = [lab.node.create_publisher(String, name, RELIABLE) for name in ("/tf", "/words")]
+    assert "/tf is not recorded: its type is std_msgs/msg/String" in "".join(
+        recorder.stderr.readline() for _ in publishers
+    )
+    lab.until(publishers[1].get_subscription_count)
+    assert lab.end(recorder)["topics"] == {"/words": 0}
 
 
 @pytest.mark.parametrize("size", [3000, 20_000])

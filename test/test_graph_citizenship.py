@@ -16,7 +16,7 @@ from robot_formation import names
 from robot_formation.bag.writer import BagWriter
 from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.in_process import absolute
+from robot_formation.names import absolute
 from robot_formation.parameters import from_mapping
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
@@ -31,7 +31,7 @@ NAMESPACES = {
     "player": SITE,
 }
 # By convention of ROS the same for all.
-OF_ROS = {"/clock", "/diagnostics", "/parameter_events", "/rosout"}
+OF_ROS = {"/diagnostics", "/parameter_events", "/rosout"}
 NEVER = 3600.0
 
 
@@ -46,7 +46,7 @@ def options_of(node, folder):
         "recorder": [f"path:={folder / 'bag'}", "topics:=[follower_1/alignment]"],
         "player": [f"bag:={folder / 'source'}", "paused:=true", "loop:=true", f"wait_s:={NEVER}"],
     }.get(node, [])
-    common = [] if node == "player" else [f"formation:={TICKS}", f"wait_for_listeners_s:={NEVER}"]
+    common = [] if node == "player" else [f"formation_namespace:={TICKS}", f"wait_for_listeners_s:={NEVER}"]
     return [word for parameter in [*common, *own] for word in ("-p", parameter)]
 
 
@@ -125,11 +125,12 @@ def as_typed(name, value):
 def dump(node, parameters):
     """The text that `ros2 param dump` prints: the full name as key, dotted names as nested mappings."""
     nested = {}
-    for name, value in parameters.items():
+    for name, value in sorted(parameters.items()):
         *groups, last = name.split(".")
         inner = nested
         for group in groups:
             inner = inner.setdefault(group, {})
+            assert isinstance(inner, dict), f"'{name}' is in a group that is a parameter too"
         inner[last] = value
     return yaml.dump({full_name(node): {"ros__parameters": nested}}, default_flow_style=False)
 
@@ -263,3 +264,35 @@ def test_ctrl_c_ends_every_node_cleanly_and_its_dumped_parameters_start_it_again
     site.start_all(lambda node: ["--params-file", str(site.folder / f"{node}.yaml")])
     assert {node: site.parameters(node) for node in NAMESPACES} == before
     assert site.interrupt_all() == dict.fromkeys(NAMESPACES, 0)
+
+
+def test_a_parameter_by_its_old_name_is_refused_with_the_new_one(lab):
+    for node in ("predictor", "drive"):
+        process = lab.start(node, "-p", "formation:=/site/formation", namespace="/follower_1")
+        _, errors = process.communicate(timeout=60)
+        assert process.returncode == 2
+        assert "no parameter 'formation'; it is called 'formation_namespace' now" in errors
+
+
+def test_a_best_effort_camera_is_heard_where_its_user_says_so(lab):
+    policy = "qos_overrides./follower_1/camera/image_raw.subscription.reliability"
+    lab.start("block_detector", "-p", f"{policy}:=best_effort", namespace="/follower_1")
+    topic = names.camera_image()
+    lab.until(lambda: lab.node.get_subscriptions_info_by_topic(f"/follower_1/{topic.name}"))
+    (info,) = lab.node.get_subscriptions_info_by_topic(f"/follower_1/{topic.name}")
+    assert info.qos_profile.reliability == QoSReliabilityPolicy.BEST_EFFORT
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("qos_overrides./follower_1/camera/image_raw.subscription.reliability", "sometimes"),
+        ("qos_overrides./follower_1/image_raw.subscription.reliability", "best_effort"),
+    ],
+)
+def test_a_quality_of_service_that_is_none_or_has_no_subscription_is_refused(lab, name, value):
+    process = lab.start("block_detector", "-p", f"{name}:={value}", namespace="/follower_1")
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "Traceback" not in errors
+    assert (value if value == "sometimes" else name) in errors

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,44 @@ def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path, node):
     assert shared_memory_ports(domains[0]) == []
     # Ports 7000 and up are shared by all domains: what another test's process still holds now may be an orphan later.
     assert {group for group in find_orphans(domains[0]) if not group.startswith("fastrtps_port70")} == set()
+
+
+@pytest.mark.parametrize("node", ["/world", "/overhead_tracker", "/follower_1/predictor", "/recorder"])
+def test_a_stopped_node_ends_the_run_by_name_with_a_whole_bag(tmp_path, node):
+    killer = Killer(node, signal.SIGSTOP, after_timesteps=2)
+    result = launch(short_scenario(*LONG), tmp_path / "bag", say=killer.say, on_start=killer.started)
+    assert result.exit_code == 4
+    assert f"node {node} was stopped" in result.reason
+    assert not any(alive(pid) for pid in killer.pids.values())
+    assert len(analyse(load_run(tmp_path / "bag")).followers[0].timesteps) >= 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bag"]
+
+
+@pytest.mark.parametrize("node", ["/overhead_tracker", "/recorder"])
+def test_a_node_stopped_at_the_end_is_named_and_the_bag_is_whole(tmp_path, node):
+    killer = Killer(node, signal.SIGSTOP, after_timesteps=4)
+    result = launch(short_scenario(), tmp_path / "bag", say=killer.say, on_start=killer.started)
+    assert result.exit_code == 4
+    assert f"node {node} was stopped" in result.reason
+    assert len(analyse(load_run(tmp_path / "bag")).followers[0].timesteps) == 4
+
+
+def test_a_launcher_that_was_stopped_for_a_while_goes_on(tmp_path):
+    command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand", "--json"]
+    command += ["--set", "leader.timesteps=4", "--bag", str(tmp_path / "bag")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        for line in process.stderr:
+            if line.startswith("timestep  1/"):
+                break
+        process.send_signal(signal.SIGSTOP)
+        # Its nodes go on: the leader's end is what shows that they have come far enough without it.
+        children = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+        while all(map(alive, children)):
+            time.sleep(0.02)
+        process.send_signal(signal.SIGCONT)
+        _, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    assert len(analyse(load_run(tmp_path / "bag")).followers[0].timesteps) == 4
 
 
 def test_a_lost_leader_ends_the_run_in_good_order(tmp_path):

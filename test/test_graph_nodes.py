@@ -78,6 +78,7 @@ def test_a_node_ends_cleanly_on_signals(lab, tmp_path, name):
         _, errors = process.communicate(timeout=DEADLINE_S)
         assert process.returncode == 0, errors
         assert "Traceback" not in errors
+        assert "Warning" not in errors
         if name == "recorder":
             (tmp_path / "bag").rename(tmp_path / f"bag_{number}")
         lab.rejoin()

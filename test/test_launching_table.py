@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.launching.processes import processes
 from robot_formation.paths import share_dir
+
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
 class Recorded:
@@ -19,7 +22,21 @@ class Recorded:
         self.arguments, self.options = arguments, options
 
     def perform(self, context):
-        return context[self.arguments[0]]
+        return context.arguments[self.arguments[0]]
+
+
+class Context:
+    """Stands in for launch's context."""
+
+    def __init__(self, arguments, pushed="", environment=()):
+        self.arguments = arguments
+        self.launch_configurations = {"ros_namespace": pushed} if pushed else {}
+        self.environment = dict(environment)
+        self.locals = types.SimpleNamespace()
+        self.is_shutdown = False
+
+    def extend_globals(self, values):
+        vars(self.locals).update(values)
 
 
 @pytest.fixture
@@ -27,7 +44,9 @@ def launch_file(monkeypatch):
     """The launch file's module, with stand-ins for launch where no ROS install has it."""
     names = {
         "launch": ["LaunchContext", "LaunchDescription"],
-        "launch.actions": ["DeclareLaunchArgument", "OpaqueFunction", "SetEnvironmentVariable", "Shutdown"],
+        "launch.actions": ["DeclareLaunchArgument", "EmitEvent", "LogInfo", "OpaqueFunction"],
+        "launch.events": ["Shutdown", "matches_action"],
+        "launch.events.process": ["ShutdownProcess"],
         "launch.substitutions": ["LaunchConfiguration"],
         "launch_ros": [],
         "launch_ros.actions": ["Node"],
@@ -44,12 +63,23 @@ def launch_file(monkeypatch):
     return module
 
 
+def context_of(launch_file, options=None, **arguments):
+    """What launch hands to the launch file when a user gives these arguments."""
+    values = {name: argument.default for name, argument in launch_file.ARGUMENTS.items()} | arguments
+    return Context(values, **(options or {}))
+
+
+def started(launch_file, options=None, **arguments):
+    """The options of the Node actions."""
+    return [node.options for node in launch_file.nodes(context_of(launch_file, options, **arguments))]
+
+
 def launched(launch_file, **arguments):
-    """What the launch file starts: executable, namespace and parameters of each node."""
-    context = {name: default for name, (default, _) in launch_file.ARGUMENTS.items()} | arguments
+    """What the launch file starts: executable, namespace and parameters of each node of the run."""
     return [
-        (node.options["executable"], node.options["namespace"], node.options["parameters"][0])
-        for node in launch_file.nodes(context)
+        (options["executable"], options["namespace"], options["parameters"][0])
+        for options in started(launch_file, **arguments)
+        if options["executable"] != "progress"
     ]
 
 
@@ -59,6 +89,7 @@ def test_both_start_the_same_nodes(launch_file, tmp_path):
         scenarios.load_track("one"), ["seed=3", "predictor.name=literal", "predictor.forgetting=0.9", "followers=2"]
     )
     ours = [(p.executable, p.namespace, p.ros_parameters()) for p in processes(scenario, bag)]
+    relative = [(executable, namespace.lstrip("/"), parameters) for executable, namespace, parameters in ours]
     theirs = launched(
         launch_file,
         track="one",
@@ -67,7 +98,7 @@ def test_both_start_the_same_nodes(launch_file, tmp_path):
         set="predictor.forgetting=0.9 followers=2",
         bag=str(bag),
     )
-    assert theirs == ours
+    assert theirs == relative
     assert [(executable, namespace) for executable, namespace, _ in ours] == [
         ("recorder", "/"),
         ("world", "/"),
@@ -100,25 +131,123 @@ def test_a_scenario_file_and_a_surface_are_taken(launch_file, tmp_path):
     assert nodes["world"]["surface"] == "plane"
 
 
-def test_rviz_is_started_beside_the_nodes_and_does_not_end_the_run(launch_file):
-    def started(**arguments):
-        defaults = {name: default for name, (default, _) in launch_file.ARGUMENTS.items()}
-        return [node.options for node in launch_file.nodes({**defaults, **arguments})]
+@pytest.fixture
+def with_rviz(launch_file, monkeypatch):
+    """A machine that has rviz2."""
+    monkeypatch.setattr(launch_file, "get_package_prefix", lambda name: f"/opt/{name}")
 
-    (viewer,) = started(rviz="true")[len(started()) :]
+
+def test_rviz_is_started_beside_the_nodes_and_does_not_end_the_run(launch_file, with_rviz):
+    (viewer,) = started(launch_file, rviz="true")[len(started(launch_file)) :]
     assert viewer["package"] == viewer["executable"] == "rviz2"
     assert Path(viewer["arguments"][1]).is_file()
     assert "on_exit" not in viewer
-    assert all("on_exit" in options for options in started())
+    assert viewer["remappings"] == []
+    assert all("on_exit" in options for options in started(launch_file))
 
 
-def test_every_launch_argument_is_declared_and_discovery_stays_here(launch_file):
-    (actions,) = launch_file.generate_launch_description().arguments
-    declared = [action.arguments[0] for action in actions if type(action).__name__ == "DeclareLaunchArgument"]
-    assert declared == list(launch_file.ARGUMENTS)
-    (variable,) = [action for action in actions if type(action).__name__ == "SetEnvironmentVariable"]
-    assert variable.arguments[0] == "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    assert launch_file.ARGUMENTS["discovery_range"][0] == "LOCALHOST"
+def test_rviz_looks_into_the_formations_namespace(launch_file, with_rviz):
+    viewer = started(launch_file, {"pushed": "site"}, rviz="true", namespace="a")[-1]
+    remappings = dict(viewer["remappings"])
+    assert remappings["/surface"] == "/site/a/surface"
+    assert remappings["/tf"] == "/site/a/tf"
+    assert remappings["/leader/robot_description"] == "/site/a/leader/robot_description"
+
+
+def test_without_rviz2_nothing_is_started_and_that_is_said(launch_file, monkeypatch, tmp_path):
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    with pytest.raises(FormationError, match="rviz:=true needs the package rviz2, which is not installed"):
+        started(launch_file, rviz="true")
+
+
+def test_a_bag_that_exists_is_refused_before_anything_is_started(launch_file, tmp_path):
+    with pytest.raises(FormationError, match="exists already"):
+        started(launch_file, bag=str(tmp_path))
+
+
+def test_every_launch_argument_is_declared_with_its_choices(launch_file):
+    (declared,) = launch_file.generate_launch_description().arguments
+    *arguments, nodes = declared
+    assert [action.arguments[0] for action in arguments] == list(launch_file.ARGUMENTS)
+    choices = {action.arguments[0]: action.options["choices"] for action in arguments}
+    assert "maybe" not in choices["images"]
+    assert choices["track"] is None
+    assert type(nodes).__name__ == "OpaqueFunction"
+
+
+@pytest.mark.parametrize(
+    ("exported", "argument", "expected"),
+    [
+        ({}, "", {RANGE: "LOCALHOST"}),
+        ({RANGE: "SUBNET"}, "", {}),  # inherited as it is
+        ({RANGE: "SUBNET"}, "OFF", {RANGE: "OFF"}),
+    ],
+)
+def test_discovery_stays_here_unless_told_otherwise_and_only_the_nodes_are_told(
+    launch_file, exported, argument, expected
+):
+    nodes = started(launch_file, {"environment": exported}, discovery_range=argument)
+    assert [options["additional_env"] for options in nodes] == [expected] * len(nodes)
+
+
+def test_names_are_relative_so_that_a_pushed_namespace_comes_first(launch_file, tmp_path):
+    bag = str(tmp_path / "bag")
+    assert {options["namespace"] for options in started(launch_file, bag=bag)} == {"", "leader", "follower_1"}
+    namespaces = {options["namespace"] for options in started(launch_file, bag=bag, namespace="site_a")}
+    assert namespaces == {"site_a", "site_a/leader", "site_a/follower_1"}
+
+
+class Ended:
+    """Stands in for launch's event of a process's end."""
+
+    def __init__(self, returncode):
+        self.returncode = returncode
+
+
+def ends(launch_file, context, nodes, codes):
+    """Let processes end in this order, all others well; return the names of the actions that follow, with arguments."""
+    handlers = {options["executable"]: options["on_exit"] for options in nodes}
+    order = [*codes, *(name for name in handlers if name not in codes)]
+    actions = [action for name in order for action in handlers[name](Ended(codes.get(name, 0)), context)]
+    return [(type(action).__name__, action.options) for action in actions]
+
+
+@pytest.mark.parametrize(
+    ("codes", "last", "says"),
+    [
+        ({"leader": 0}, "EmitEvent", "outcome: done"),
+        ({"fine_tuner": 3}, "OpaqueFunction", "outcome: lost (follower_1/fine_tuner ended with exit code 3)"),
+        ({"world": -9}, "OpaqueFunction", "outcome: incomplete (world was killed by SIGKILL)"),
+    ],
+)
+def test_the_first_end_ends_the_run_and_the_last_one_says_how_it_went(launch_file, codes, last, says):
+    context = context_of(launch_file)
+    nodes = [node.options for node in launch_file.nodes(context)]
+    nodes = [options for options in nodes if options["namespace"] != "leader" or options["executable"] == "leader"]
+    context.locals.robot_formation_runs[0].processes = len(nodes)
+    actions = ends(launch_file, context, nodes, codes)
+    events = [type(options["event"]).__name__ for name, options in actions if name == "EmitEvent"]
+    assert events[0] == "ShutdownProcess"
+    assert actions[-1][0] == last
+    told = [options["msg"] for name, options in actions if name == "LogInfo"]
+    told += [text for name, options in actions if name == "OpaqueFunction" for text in options["args"]]
+    assert told == [says]
+
+
+def test_of_two_runs_the_first_leaves_the_other_alone_and_a_failure_is_told_at_the_end(launch_file):
+    context = context_of(launch_file)
+    for _ in range(2):
+        launch_file.nodes(context)
+    first, second = context.locals.robot_formation_runs
+    for run, name, code in ((first, "fine_tuner", 3), (second, "leader", 0)):
+        run.processes = 1
+        run.ended(name, name, code, stopping=False)
+        actions = launch_file.conclusion(run, [first, second])
+        second.processes = 1 if run is second else 2
+    assert [type(action).__name__ for action in actions] == ["LogInfo", "OpaqueFunction"]
+    assert "outcome: lost" in actions[1].options["args"][0]
+    with pytest.raises(FormationError, match="outcome: lost"):
+        launch_file.fail(context, *actions[1].options["args"])
 
 
 def test_parameters_survive_the_way_through_a_ros_parameter_file(tmp_path):
@@ -132,3 +261,11 @@ def test_parameters_survive_the_way_through_a_ros_parameter_file(tmp_path):
 def test_without_the_overhead_camera_its_tracker_is_not_started():
     scenario = scenarios.override(scenarios.load_track("two"), ["world.overhead.enabled=false"])
     assert "overhead_tracker" not in {process.executable for process in processes(scenario, None)}
+
+
+def test_a_formation_in_a_namespace_lies_there_as_a_whole(tmp_path):
+    scenario = scenarios.load_track("two")
+    placed = [process.name for process in processes(scenario, tmp_path / "bag", namespace="/site_a")]
+    assert placed == [f"/site_a{process.name}" for process in processes(scenario, tmp_path / "bag")]
+    assert "/site_a/follower_1/drive" in placed
+    assert "/site_a/recorder" in placed

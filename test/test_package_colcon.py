@@ -23,7 +23,7 @@ BIN = Path(sys.executable).parent
 
 
 PATH = f"{BIN}{os.pathsep}{os.environ.get('PATH', '')}"
-NODES = [*KINDS, "recorder", "player"]
+NODES = [*KINDS, "recorder", "player", "progress"]
 
 
 def run_colcon(workspace, *arguments):

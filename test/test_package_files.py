@@ -2,11 +2,13 @@
 
 import ast
 import configparser
+import importlib.util
 import os
 import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 
 import pytest
@@ -82,11 +84,32 @@ def test_package_xml_names_every_ros_package_that_is_imported(package_xml):
     assert imported <= keys
 
 
+def test_every_requirement_has_a_rosdep_key_that_brings_it(package_xml, setup_arguments):
+    brings = {
+        "mcap-ros2-support": {"mcap", "zstandard"},
+        "python3-opencv": {"opencv-python-headless"},
+        "python3-yaml": {"PyYAML"},
+        **{f"python3-{name}": {name} for name in ("joblib", "matplotlib", "numpy")},
+        **{f"python3-{name}-pip": {name} for name in ("pybullet", "rosbags")},
+    }
+    keys = {element.text for element in package_xml.iter("exec_depend")}
+    required = {requirement.partition(">=")[0] for requirement in setup_arguments["install_requires"]}
+    assert set().union(*(brings.get(key, set()) for key in keys)) == required
+
+
 def test_no_requirement_has_an_upper_cap(setup_arguments):
     requirements = list(setup_arguments["install_requires"])
     for extra in setup_arguments["extras_require"].values():
         requirements += extra
     assert not [requirement for requirement in requirements if re.search(r"<|==|~=", requirement)]
+
+
+def test_the_lowest_versions_that_are_tested_are_the_lower_bounds(setup_arguments):
+    requirements = [*setup_arguments["install_requires"], *setup_arguments["extras_require"]["test"]]
+    bounds = dict(requirement.split(">=") for requirement in requirements if ">=" in requirement)
+    lines = (ROOT / ".ci" / "lowest.txt").read_text().partition("# Not ours")[0].splitlines()
+    assert dict(line.split("==") for line in lines if not line.startswith("#")) == bounds
+    assert [requirement for requirement in setup_arguments["install_requires"] if ">=" not in requirement] == []
 
 
 def test_each_executable_starts_a_main_that_exists(setup_arguments):
@@ -103,7 +126,7 @@ def test_each_node_is_an_executable_of_its_name(setup_arguments):
     nodes = {file.stem for file in NODES.glob("*.py") if has_main(file)}
     assert nodes
     assert {f"{node} = robot_formation.nodes.{node}:main" for node in nodes} == set(scripts) - {
-        "formation = robot_formation.cli.main:main"
+        "formation = robot_formation.cli.__main__:main"
     }
 
 
@@ -139,7 +162,35 @@ def test_executables_go_where_ros2_run_looks():
     assert config["develop"]["script_dir"] == config["install"]["install_scripts"] == "$base/lib/robot_formation"
 
 
-@pytest.mark.parametrize("script", ["formation", ".ci/run"])
+def differences(one, other, tolerance):
+    """What .ci/same_runs says of two results."""
+    loader = SourceFileLoader("same_runs", str(ROOT / ".ci" / "same_runs"))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("same_runs", loader))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "dont_write_bytecode", True)
+        loader.exec_module(module)
+    return module.differences(one, other, tolerance)
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        ({"a": [1.0, None], "b": "done"}, []),
+        ({"a": [1.0 + 1e-12, None], "b": "done"}, []),
+        ({"a": [1.0 + 1e-6, None], "b": "done"}, ["run.a[0]: 1.0, 1.000001"]),
+        ({"a": [None, None], "b": "done"}, ["run.a[0]: 1.0, None"]),
+        ({"a": [1.0, None], "b": "lost"}, ["run.b: 'done', 'lost'"]),
+        ({"a": [1.0], "b": "done"}, ["run.a: [1.0, None], [1.0]"]),
+        ({"b": "done"}, ["run: {'a': [1.0, None], 'b': 'done'}, {'b': 'done'}"]),
+    ],
+)
+def test_runs_of_two_environments_are_told_apart_beyond_the_tolerance(other, said):
+    one = {"a": [1.0, None], "b": "done"}
+    assert differences(one, other, 1e-9) == said
+    assert bool(differences(one, other, 0.0)) == (one != other)
+
+
+@pytest.mark.parametrize("script", ["formation", ".ci/run", ".ci/lowest"])
 def test_the_shell_scripts_are_executable_and_parse(script):
     assert os.access(ROOT / script, os.X_OK)
     shell = (ROOT / script).read_text().splitlines()[0].split("/")[-1].split()[-1]

@@ -10,7 +10,10 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "robot_formation"
 
 LAYERS = [
-    {"", "errors", "exit_codes", "names", "parameters", "paths", "tags"},
+    {
+        *("", "errors", "exit_codes", "files", "loopback", "names", "parameters", "paths", "png_files", "tags"),
+        *("shared_memory_space", "yaml_files"),
+    },
     {"geometry"},
     {"surface"},
     {"world"},

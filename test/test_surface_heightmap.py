@@ -153,7 +153,7 @@ def archive(tmp_path):
         (lambda path: npy(path, np.zeros((4097, 4097), np.uint16)), "4097 x 4097 samples"),
         (lambda path: npy(path, np.zeros((8, 8), np.int32)), "holds int32 numbers"),
         (lambda path: npy(path, np.zeros((8, 8), complex)), "holds complex128 numbers"),
-        (lambda path: npy(path, np.array([[{}] * 8] * 8)), "neither a PNG nor a usable NPY"),
+        (lambda path: npy(path, np.array([[{}] * 8] * 8)), "holds object numbers"),
         (lambda path: npy(path, np.full((8, 8), math.nan)), "not finite"),
         (lambda path: npy(path, np.full((8, 8), math.inf)), "not finite"),
         (lambda path: npy(path, np.full((8, 8), 1e300)), "choose scale_m"),

@@ -9,8 +9,8 @@ import yaml
 from robot_formation import names
 from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.in_process import absolute
 from robot_formation.experiment.scenario import load_track
+from robot_formation.names import absolute
 from robot_formation.parameters import from_mapping
 from robot_formation.paths import config_dir
 
@@ -29,7 +29,7 @@ RVIZ_TYPES = {
 def topics():
     """Every topic of a run of track two, absolute, with its QoS and type."""
     scenario = load_track("two")
-    found = {topic.name: topic for topic in (names.TF, names.TF_STATIC)}
+    found = {absolute("", topic.name): topic for topic in (names.TF, names.TF_STATIC)}
     for kind, robot in scenario.hosts():
         values = scenario.robot_parameters(kind.name, robot)
         parameters = from_mapping(KINDS[kind.name].parameter_class(), values, where="test")

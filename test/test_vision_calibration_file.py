@@ -105,7 +105,7 @@ def test_calibrated_offset_is_zero_where_the_curves_say_formation():
         ("alignment: {distance_m: .nan}", ["distance_m", "finite"]),
         ("alignment: [1, 2]", ["no camera calibration", "formation calibrate vision"]),
         ("alignment: {}", ["no camera calibration"]),
-        ("{", ["no YAML"]),
+        ("{", ["no valid YAML"]),
         ("", ["no camera calibration"]),
         ("alignment: {target_x_px: 135}\nmeasured_with: 3", ["measured_with"]),
     ],

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tag_helpers import missing
 
 from robot_formation import tags
 from robot_formation.surface import make_surface
@@ -17,6 +18,9 @@ from robot_formation.vision.tags import TagDetector, TagParameters
 from robot_formation.vision.tracking import ClockError
 from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
 from robot_formation.world.parameters import MarkerParameters
+
+if missing():
+    pytest.skip(missing(), allow_module_level=True)
 
 WORLD = WorldParameters(marker=MarkerParameters(kind="tags"))
 PLANE, BOWL = make_surface("plane"), make_surface("bowl")

@@ -1,8 +1,11 @@
 """The marker of tags: drawn where it belongs, not mirrored, and without a trace in a world of colours."""
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
+from tag_helpers import needs_tags
 from world_helpers import parameters
 
 from robot_formation import tags
@@ -18,6 +21,7 @@ PLANE = make_surface("plane")
 TAGS = {"marker": {"kind": "tags"}}
 
 
+@needs_tags
 @pytest.mark.parametrize(("face", "name"), [(Face.TARGET, "target"), (Face.FRONT, "front"), (Face.REAR, "rear")])
 def test_each_face_shows_its_pattern_upright_and_not_mirrored(face, name):
     # Seen from near by a camera of four times the resolution, module by module.
@@ -30,6 +34,7 @@ def test_each_face_shows_its_pattern_upright_and_not_mirrored(face, name):
     assert ((levels > levels.mean()) == pattern(face)).all()
 
 
+@needs_tags
 def test_the_tag_has_the_size_of_the_face_in_the_picture():
     light = Camera(PLANE, parameters(**TAGS)).light(
         pose_on_surface(PLANE, 0.9, 0.4, 0.0), [pose_on_surface(PLANE, 0.9, 0.72, 0.0)]
@@ -41,6 +46,7 @@ def test_the_tag_has_the_size_of_the_face_in_the_picture():
     assert (dark[0], dark[-1]) == pytest.approx((157.5 - 19.5, 157.5 + 19.5), abs=1.0)
 
 
+@needs_tags
 @pytest.mark.parametrize("face", Face)
 def test_rectangles_lie_on_their_face_inside_its_margin_and_look_outward(face):
     edge, middle = 0.06, 0.186
@@ -68,6 +74,7 @@ def test_a_world_of_colours_has_the_same_faces_whatever_its_tags_would_look_like
         assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
 
 
+@needs_tags
 def test_the_colour_of_light_and_dark_is_what_the_parameters_say():
     marker = {"kind": "tags", "tag_light_rgb": [200, 0, 0], "tag_dark_rgb": [0, 0, 200]}
     picture = marker_picture(parameters(marker=marker))
@@ -88,8 +95,11 @@ def test_viewers_see_light_plates_where_the_tags_are():
     assert "rgb_205_14_16" not in text
 
 
-def test_an_opencv_without_tags_is_told_when_the_scene_is_made(monkeypatch):
-    monkeypatch.delattr(cv2.aruco, "ArucoDetector")
+@pytest.mark.parametrize("aruco", [None, SimpleNamespace(DICT_5X5_50=4, drawMarker=print)])
+def test_an_opencv_without_tags_is_told_when_the_scene_is_made(monkeypatch, aruco):
+    monkeypatch.setattr(cv2, "aruco", aruco, raising=False)
     Scene(PLANE, WorldParameters())
     with pytest.raises(tags.TagError, match="OpenCV"):
         Scene(PLANE, parameters(**TAGS))
+    with pytest.raises(tags.TagError, match="OpenCV"):
+        pattern(Face.TARGET)

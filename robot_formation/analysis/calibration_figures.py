@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from robot_formation.analysis.drawing import new_figure, save_figure
+from robot_formation.analysis.drawing import legend_below, new_figure, save_figure
 from robot_formation.control.calibration_fit import AxisFit
 from robot_formation.control.distance_comparison import DistanceComparison
 from robot_formation.names import LEADER
@@ -45,11 +45,8 @@ def draw_motors(fits: Mapping[str, Mapping[str, AxisFit]], title: str, path: str
         axes[1, column].autoscale(axis="x")
     axes[0, 0].set_ylabel("travelled distance (cm)")
     axes[1, 0].set_ylabel("measured -\ncurve (mm)")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    below, below_labels = axes[1, 0].get_legend_handles_labels()
-    figure.legend(
-        handles + below, labels + below_labels, loc="outside lower center", ncols=3, frameon=False, fontsize=9
-    )
+    handles = axes[0, 0].get_legend_handles_labels()[0] + axes[1, 0].get_legend_handles_labels()[0]
+    legend_below(figure, handles, 3, fontsize=9)
     figure.suptitle(title, fontsize=12)
     return save_figure(figure, path)
 
@@ -70,9 +67,8 @@ def draw_encoders(comparisons: Sequence[DistanceComparison], title: str, path: s
         panel.set_title(f"({chr(ord('a') + number)}) {_AXIS_NAMES[axis]}", fontsize=10)
         panel.set(xlabel="preset distance (cm)", ylabel="measured distance (cm)")
         bars.set_ylabel("sensing - reference (% of reference)", color="0.35")
-    handles, labels = panels[0].get_legend_handles_labels()
-    grey, grey_labels = bars.get_legend_handles_labels()
-    figure.legend(handles + grey, labels + grey_labels, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    handles = panels[0].get_legend_handles_labels()[0] + bars.get_legend_handles_labels()[0]
+    legend_below(figure, handles, 4, fontsize=9)
     figure.suptitle(title, fontsize=12)
     return save_figure(figure, path)
 

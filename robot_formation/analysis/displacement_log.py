@@ -8,6 +8,7 @@ lines and lines that begin with '#'. Both cells of a residual or a command may b
 from __future__ import annotations
 
 import csv
+import io
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -18,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.analysis.errors import AnalysisError
+from robot_formation.errors import shown
+from robot_formation.files import read_file
 from robot_formation.parameters import suggestion
 
 DISPLACEMENT, RESIDUAL, COMMANDED = ((f"{prefix}u_m", f"{prefix}v_m") for prefix in ("", "residual_", "commanded_"))
@@ -27,6 +30,9 @@ _COLUMNS = tuple(name for pair in _PAIRS for name in pair)
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
 _SHOWN = 40  # characters of a wrong cell
+_MOST_BYTES = 32 << 20
+_MOST_ROWS = 100_000  # a forecast of each takes up to a millisecond
+_MOST_CHARACTERS = 20_000  # of a line
 
 
 @dataclass(frozen=True)
@@ -90,6 +96,8 @@ def read_log(path: str | Path) -> DisplacementLog:
         where = f"{path}, line {number}"
         if len(cells) != width:
             raise AnalysisError(f"{where}: the header names {width} columns, the row has {len(cells)}; correct the row")
+        if len(rows) == _MOST_ROWS:
+            raise AnalysisError(f"{where}: a log holds up to {_MOST_ROWS} timesteps; split the file")
         rows.append([value for pair in _PAIRS for value in _pair(where, pair, columns, cells)])
         places.append(f"line {number}")
     if not rows:
@@ -122,8 +130,12 @@ def write_log(log: DisplacementLog, path: str | Path) -> None:
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Yield each line's number and cells; cells may be quoted but can't go on in the next line."""
     try:
-        with path.open(encoding="utf-8-sig") as file:
+        with io.StringIO(read_file(path, _MOST_BYTES).decode("utf-8-sig"), newline=None) as file:
             for number, line in enumerate(file, 1):
+                if len(line) > _MOST_CHARACTERS:
+                    raise AnalysisError(
+                        f"{path}, line {number}: has more than {_MOST_CHARACTERS} characters; correct it"
+                    )
                 if line.strip() and not line.lstrip().startswith("#"):
                     cells = next(csv.reader([line.rstrip("\n")], strict=True, skipinitialspace=True))
                     yield number, [cell.strip() for cell in cells]
@@ -139,7 +151,7 @@ def _columns(where: str, header: Sequence[str]) -> dict[str, int]:
     """Find the columns by name."""
     others = [mark for mark in (";", "\t") if any(mark in cell for cell in header)]
     if others:
-        raise AnalysisError(f"{where}: columns are separated by {others[0]!r}; separate them by commas")
+        raise AnalysisError(f"{where}: columns are separated by {shown(others[0])}; separate them by commas")
     for name in _COLUMNS:
         if header.count(name) > 1:
             raise AnalysisError(f"{where}: column '{name}' is there {header.count(name)} times; leave one")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from robot_formation.analysis.errors import AnalysisError
 
 DPI = 150
+_GAP = 0.01  # between a legend and the figure's lower edge, share of the figure's height
 
 
 def new_figure(width: float, height: float) -> Any:
@@ -19,6 +21,30 @@ def new_figure(width: float, height: float) -> Any:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def legend_below(figure: Any, handles: Sequence[Any], columns: int, **style: Any) -> None:
+    """Write a legend, centred, below all panels, and let the layout keep its room free.
+
+    Not by the place "outside lower center", which matplotlib has from 3.7 on only.
+
+    Args:
+        figure: made by `new_figure`.
+        handles: what the legend lists, each with its label.
+        columns: of the legend.
+        style: further arguments of matplotlib's legend.
+    """
+    legend = figure.legend(
+        handles=handles,
+        loc="lower center",
+        bbox_to_anchor=(0.5, _GAP),
+        borderaxespad=0.0,
+        ncols=columns,
+        frameon=False,
+        **style,
+    )
+    room = _GAP + legend.get_window_extent().height / figure.bbox.height
+    figure.get_layout_engine().set(rect=(0.0, room, 1.0, 1.0 - room))
 
 
 def save_figure(figure: Any, path: str | Path) -> Path:

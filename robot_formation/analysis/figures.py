@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.analysis.drawing import new_figure, save_figure
+from robot_formation.analysis.drawing import legend_below, new_figure, save_figure
 from robot_formation.analysis.quantities import Corrections, FollowerAnalysis, RunAnalysis
 from robot_formation.analysis.record import Ground, RunRecord, Track
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
@@ -53,7 +53,7 @@ def draw_trajectory(record: RunRecord, analysis: RunAnalysis, path: str | Path) 
     # Contour lines end at the plate's edges, which then are the picture's.
     axes.margins(0.1 if record.ground is None else 0.0)
     axes.set(xlabel="x (cm)", ylabel="y (cm)", aspect="equal", title=_title(record, analysis))
-    figure.legend(loc="outside lower center", ncols=6, frameon=False, fontsize=9, columnspacing=1.4)
+    legend_below(figure, axes.get_legend_handles_labels()[0], 6, fontsize=9, columnspacing=1.4)
     return save_figure(figure, path)
 
 
@@ -76,8 +76,8 @@ def draw_corrections(record: RunRecord, analysis: RunAnalysis, path: str | Path)
         said = "" if total is None else f": {total * _CM:.1f} cm from timestep {COLLECTION_TIMESTEPS + 1} on"
         axes.set_title(f"{follower.name.replace('_', ' ')}{said}", loc="left", fontsize=10)
     np.atleast_1d(panels)[-1].set_xlabel("timestep")
-    handles, labels = np.atleast_1d(panels)[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    handles, _ = np.atleast_1d(panels)[0].get_legend_handles_labels()
+    legend_below(figure, handles, len(handles))
     figure.suptitle(_title(record, analysis), fontsize=12)
     return save_figure(figure, path)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.analysis.displacement_log import DisplacementLog
-from robot_formation.analysis.drawing import new_figure, save_figure
+from robot_formation.analysis.drawing import legend_below, new_figure, save_figure
 from robot_formation.analysis.forecasts import OneStepForecasts
 
 # Okabe and Ito's palette, safe for colour-blind readers.
@@ -92,4 +92,4 @@ def _legend(figure: Any, target: str) -> None:
         Line2D([], [], color="0.45", linewidth=1.6, label="forecast from the timesteps before"),
         Patch(color="0.45", alpha=0.3, linewidth=0, label="its 90 % band"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+    legend_below(figure, handles, len(handles))

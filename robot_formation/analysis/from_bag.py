@@ -16,7 +16,8 @@ from robot_formation import names
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
-from robot_formation.bag.reader import Bag, read_bag
+from robot_formation.bag.formation_bag import FormationBag
+from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import suggestion
@@ -26,18 +27,22 @@ _LOGGED = (names.DISPLACEMENT, names.RESIDUAL, names.COMMANDED)
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
 
 
-def load_run(path: str | Path) -> RunRecord:
+def load_run(path: str | Path, namespace: str | None = None) -> RunRecord:
     """Read a run's bag, finished or not.
 
+    Args:
+        path: the bag.
+        namespace: where the formation lies in it, '/' for the root; None: wherever there is one.
+
     Raises:
-        BagError: the bag is missing, no bag, empty or corrupted.
+        BagError: the bag is missing, no bag, empty or corrupted, or holds several formations.
         AnalysisError: the bag has no run of a formation.
     """
     with read_bag(path) as bag:
-        return run_record(bag)
+        return run_record(FormationBag(bag, namespace))
 
 
-def run_record(bag: Bag) -> RunRecord:
+def run_record(bag: FormationBag) -> RunRecord:
     """Take a run's record out of an open bag.
 
     Raises:
@@ -71,8 +76,8 @@ def record_of(
     """
     messages = defaultdict(list, messages)
     stamps = defaultdict(list, stamps or {})
-    markers = messages[_absolute(names.SURFACE.name)]
-    tracks = {robot: _track(messages[_absolute(names.ground_truth_odom(robot).name)]) for robot in robots}
+    markers = messages[names.absolute("", names.SURFACE.name)]
+    tracks = {robot: _track(messages[names.absolute("", names.ground_truth_odom(robot).name)]) for robot in robots}
     record = RunRecord(
         leader_moved=_stamped(messages[f"/{names.LEADER}/{names.MOVED.name}"]),
         followers=tuple(_follower(robot, messages, stamps) for robot in robots if robot != names.LEADER),
@@ -80,25 +85,34 @@ def record_of(
         simulated_s=_last_stamp_ns(messages) / 1e9,
         details=details,
         ground=_ground(markers[-1]) if markers else None,
-        left_plate=tuple(message.data for message in messages[_absolute(names.left_plate().name)]),
+        left_plate=tuple(message.data for message in messages[names.absolute("", names.left_plate().name)]),
     )
     return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
 
 
-def load_displacements(path: str | Path, robot: str) -> DisplacementLog:
+def load_displacements(path: str | Path, robot: str, namespace: str | None = None) -> DisplacementLog:
     """Read a robot's displacements, residuals and commands, as its predictor got them: paired by their stamps.
 
+    Args:
+        path: the bag.
+        robot: the robot's name.
+        namespace: where its formation lies in the bag, '/' for the root; None: wherever there is one.
+
     Raises:
-        BagError: the bag is missing, no bag, empty or corrupted, or a topic has another message type than a run's.
+        BagError: the bag is missing, no bag, empty or corrupted, it holds several formations, or a topic has another
+            message type than a run's.
         AnalysisError: the bag has no displacements of this robot.
     """
-    with read_bag(path) as bag:
+    with read_bag(path) as opened:
+        bag = FormationBag(opened, namespace)
         topics = {f"/{robot}/{topic.name}": topic.type for topic in _LOGGED}
         _require_displacements(bag, robot)
         bag.require({topic: type_name for topic, type_name in topics.items() if topic in bag.topics})
         messages: dict[str, list[Any]] = defaultdict(list)
         for message in bag.messages(topics):
             messages[message.topic].append(message.message)
+    if not messages[f"/{robot}/{names.DISPLACEMENT.name}"]:
+        raise AnalysisError(f"{path} has no displacements of '{robot}'; give the bag of a run with finished timesteps")
     by_stamp = [{entry.stamp_ns: entry.motion for entry in _stamped(messages[topic])} for topic in topics]
     stamps = sorted(by_stamp[0])
     columns = [
@@ -108,7 +122,7 @@ def load_displacements(path: str | Path, robot: str) -> DisplacementLog:
     return DisplacementLog(str(path), tuple(f"timestep {t}" for t in range(1, len(stamps) + 1)), *columns)
 
 
-def _require_displacements(bag: Bag, robot: str) -> None:
+def _require_displacements(bag: FormationBag, robot: str) -> None:
     pattern = re.compile(rf"/([^/]+)/{names.DISPLACEMENT.name}")
     robots = [match[1] for topic in bag.topics if (match := pattern.fullmatch(topic))]
     if not robots:
@@ -127,7 +141,7 @@ def _last_stamp_ns(messages: Mapping[str, Sequence[Any]]) -> int:
     )
 
 
-def _robots(bag: Bag) -> list[str]:
+def _robots(bag: FormationBag) -> list[str]:
     """Find the robots by their topics: the leader, then the followers by number."""
     topics = "|".join(topic.name for topic in (*_MOTIONS, names.ALIGNMENT))
     found = {match[1] for topic in bag.topics if (match := re.fullmatch(rf"/follower_([1-9]\d*)/(?:{topics})", topic))}
@@ -141,18 +155,15 @@ def _robots(bag: Bag) -> list[str]:
 
 def run_topics(robots: Sequence[str]) -> dict[str, str]:
     """Name the topics that the analysis reads, with their message types."""
-    topics = {_absolute(topic.name): topic.type for topic in (names.SURFACE, names.left_plate())}
+    topics = {
+        names.absolute("", topic.name): topic.type
+        for topic in (names.SURFACE, names.left_plate(), names.OVERHEAD_POSES)
+    }
     for robot in robots:
         odom = names.ground_truth_odom(robot)
-        topics[_absolute(odom.name)] = odom.type
-        seen = names.overhead_path(robot)
-        topics[_absolute(seen.name)] = seen.type
+        topics[names.absolute("", odom.name)] = odom.type
         topics.update({f"/{robot}/{topic.name}": topic.type for topic in (*_MOTIONS, names.MOVE, names.ALIGNMENT)})
     return topics
-
-
-def _absolute(name: str) -> str:
-    return name if name.startswith("/") else f"/{name}"
 
 
 def _follower(robot: str, messages: Mapping[str, Sequence[Any]], stamps: Mapping[str, Sequence[int]]) -> FollowerRecord:
@@ -215,22 +226,28 @@ def _track(messages: Sequence[Any]) -> Track | None:
 def _overhead(
     robots: Sequence[str], messages: Mapping[str, Sequence[Any]], dot_height_m: float
 ) -> dict[str, OverheadTrack]:
-    """Compare the tracker's last path of each robot with the true places of its dot."""
+    """Compare where the tracker saw each robot's dot with the dot's true places.
+
+    The tracker tells the places of all robots after each picture, in their order. One that it doesn't see keeps its
+    place to the last bit; one that it sees never does, since pictures are noisy.
+    """
+    told = sorted(messages[names.absolute("", names.OVERHEAD_POSES.name)], key=_stamp_ns)
+    told = [message for message in told if len(message.poses) == len(robots)]
     tracks = {}
-    for robot in robots:
-        paths = messages[_absolute(names.overhead_path(robot).name)]
-        truth = messages[_absolute(names.ground_truth_odom(robot).name)]
-        if not paths or not truth:
+    for number, robot in enumerate(robots):
+        truth = messages[names.absolute("", names.ground_truth_odom(robot).name)]
+        if not told or not truth:
             continue
-        poses = max(paths, key=_stamp_ns).poses
-        stamps = np.array([_stamp_ns(pose) for pose in poses], dtype=np.int64)
-        seen = np.array([_place(pose.pose.position) for pose in poses])
+        places = np.array([_place(message.poses[number].position) for message in told])
+        moved = np.append(True, np.any(places[1:] != places[:-1], axis=1))
+        stamps = np.array([_stamp_ns(message) for message in told], dtype=np.int64)[moved]
+        seen = places[moved]
         true_stamps = np.array([_stamp_ns(message) for message in truth], dtype=np.int64)
         order = np.argsort(true_stamps, kind="stable")
         # A robot that stands says nothing, so its last word before the picture holds.
         index = np.searchsorted(true_stamps[order], stamps, side="right") - 1
         known = index >= 0
-        dots = np.array([_dot(truth[number].pose.pose, dot_height_m) for number in order[index[known]]])
+        dots = np.array([_dot(truth[entry].pose.pose, dot_height_m) for entry in order[index[known]]])
         tracks[robot] = OverheadTrack(stamps[known], seen[known].reshape(-1, 3), dots.reshape(-1, 3))
     return tracks
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -139,20 +141,22 @@ class RunRecord:
     def timesteps_planned(self) -> int | None:
         """Timesteps that the scenario has, if the run says."""
         text = self.details.get("timesteps", "")
-        return int(text) if text.isdigit() else None
+        return int(text) if re.fullmatch("[0-9]{1,9}", text) else None
 
     @property
     def dot_height_m(self) -> float:
         """Height of the reference dot above base_link, metres: what the run says, else the paper's robot's."""
         try:
-            return float(json.loads(self.details["parameters"])["world"]["marker.top_m"])
-        except (KeyError, ValueError, TypeError):
+            said = float(json.loads(self.details["parameters"])["world"]["marker.top_m"])
+        except (KeyError, ValueError, TypeError, OverflowError, RecursionError):
             return DOT_HEIGHT_M
+        return said if math.isfinite(said) else DOT_HEIGHT_M
 
     @property
     def formation_distance_m(self) -> float:
         """Distance between neighbours in formation, metres: what the run says, else the paper's."""
         try:
-            return float(self.details["formation_distance_m"])
+            said = float(self.details["formation_distance_m"])
         except (KeyError, ValueError):
             return FORMATION_DISTANCE_M
+        return said if math.isfinite(said) else FORMATION_DISTANCE_M

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from robot_formation.analysis.conditions import conditions_text, run_facts
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.figures import draw_corrections, draw_trajectory
 from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, Timestep
 from robot_formation.analysis.record import RunRecord
-from robot_formation.bag.reader import bag_name
+from robot_formation.bag.folder import bag_name
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion
 
@@ -25,14 +26,16 @@ _WIDTHS = (3, 13, 13, 13, 13, 6, 10, 8)
 _NONE = "-"
 
 
-def to_json(analysis: RunAnalysis) -> str:
-    """Return the analysis in the command line's JSON shape, without NaN."""
-    return json.dumps(analysis.to_json(), indent=2, allow_nan=False)
+def to_json(analysis: RunAnalysis, said: Mapping[str, Any] | None = None) -> str:
+    """Return the analysis in the command line's JSON shape, without NaN; `said` holds further entries."""
+    return json.dumps({**analysis.to_json(), **(said or {})}, indent=2, allow_nan=False)
 
 
 def text_report(record: RunRecord, analysis: RunAnalysis) -> str:
     """Return the tables and totals, centimetres and degrees, u to the right and v forward."""
     said = [f"{key} {record.details[key]}" for key in ("predictor", "surface", "seed") if record.details.get(key)]
+    known = conditions_text(run_facts(record.details)["conditions"])
+    said += [known] if known else []
     head = f"{analysis.scenario or 'formation run'}{': ' if said else ''}{', '.join(said)}"
     sections = [head]
     for follower in analysis.followers:

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcap.reader import make_reader
-
+from robot_formation.bag.folder import storage_files
+from robot_formation.bag.formation_bag import formation_namespaces
 from robot_formation.bag.metadata import TopicSummary
-from robot_formation.bag.reader import Bag, read_bag, storage_files
+from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
+from robot_formation.files import size_text
 
 _DETAILS = ("scenario", "seed", "predictor", "surface", "git_commit", "dropped", "lost")
+_EARLIEST_DATE_NS = 10**18  # September 2001: no clock of a ROS robot has shown an earlier date
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class BagInfo:
         end_ns: log time of the last message, nanoseconds.
         topics: its topics with type, QoS and number of messages.
         details: the texts of its metadata record `robot_formation`.
+        warnings: what is wrong with it though it can be read.
     """
 
     path: Path
@@ -46,11 +49,17 @@ class BagInfo:
     end_ns: int
     topics: tuple[TopicSummary, ...]
     details: dict[str, str]
+    warnings: tuple[str, ...] = ()
 
     @property
     def message_count(self) -> int:
         """Messages in the bag."""
         return sum(topic.message_count for topic in self.topics)
+
+    @property
+    def simulated_time(self) -> bool:
+        """Whether the log times are a simulation's seconds since its start, and no dates."""
+        return self.message_count > 0 and self.end_ns < _EARLIEST_DATE_NS
 
     def to_mapping(self) -> dict[str, Any]:
         """Return what `--json` prints."""
@@ -64,10 +73,12 @@ class BagInfo:
             "ros_distro": self.ros_distro or None,
             "start_ns": self.start_ns,
             "end_ns": self.end_ns,
+            "simulated_time": self.simulated_time,
             "duration_s": (self.end_ns - self.start_ns) / 1e9,
             "messages": self.message_count,
             "topics": [_topic(topic) for topic in self.topics],
             "metadata": {key: _parsed(text) for key, text in self.details.items()},
+            "warnings": list(self.warnings),
         }
 
 
@@ -81,12 +92,13 @@ def bag_info(path: str | Path) -> BagInfo:
             storage="sqlite3" if ".db3" in "".join(file.name for file in files) else "mcap",
             files=tuple(file.name for file in files),
             size_bytes=sum(file.stat().st_size for file in files),
-            compression=_compression(bag, files),
+            compression="unknown" if bag.recovered else bag.compression,
             ros_distro=bag.ros_distro,
             start_ns=bag.start_ns,
             end_ns=bag.end_ns,
             topics=tuple(bag.contents),
             details=bag.metadata(METADATA_NAME),
+            warnings=tuple(bag.warnings),
         )
 
 
@@ -94,15 +106,19 @@ def info_text(info: BagInfo) -> str:
     """Write the summary as `ros2 bag info` does."""
     facts = [
         ("Files", "\n".join(info.files)),
-        ("Bag size", _size(info.size_bytes)),
+        ("Bag size", size_text(info.size_bytes)),
         ("Storage id", f"{info.storage}, compression {info.compression}"),
         ("ROS Distro", info.ros_distro or "unknown"),
         ("Duration", f"{(info.end_ns - info.start_ns) / 1e9:.9f}s"),
-        ("Start", _date(info.start_ns)),
-        ("End", _date(info.end_ns)),
+        ("Start", _date(info.start_ns, simulated=info.simulated_time)),
+        ("End", _date(info.end_ns, simulated=info.simulated_time)),
         ("Messages", str(info.message_count)),
         *((key, info.details[key]) for key in _DETAILS if info.details.get(key)),
     ]
+    facts += [("Warning", warning) for warning in info.warnings]
+    formations = formation_namespaces(topic.name for topic in info.topics if topic.message_count)
+    if any(formations):
+        facts.append(("Formations in", ", ".join(namespace or "/" for namespace in formations)))
     if not info.closed:
         facts.insert(0, ("Not closed", f"figures of what 'formation recover {info.path}' would save"))
     lines = []
@@ -118,18 +134,6 @@ def info_text(info: BagInfo) -> str:
         for topic in info.topics
     ]
     return "\n".join(lines)
-
-
-def _compression(bag: Bag, files: list[Path]) -> str:
-    """Name the compression of an MCAP bag's chunks; rosbag2's own compressions are named by their mode."""
-    if bag.outer_compression:
-        return bag.outer_compression
-    if not bag.recovered and files and files[0].suffix == ".mcap":
-        with files[0].open("rb") as stream:
-            summary = make_reader(stream).get_summary()
-        kinds = {index.compression or "none" for index in summary.chunk_indexes} if summary else set()
-        return ", ".join(sorted(kinds)) or "none"
-    return "unknown" if bag.recovered else "none"
 
 
 def _topic(topic: TopicSummary) -> dict[str, Any]:
@@ -151,18 +155,11 @@ def _parsed(text: str) -> Any:
     """Read a metadata text that is JSON; others stay texts."""
     try:
         return json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return text
 
 
-def _size(size_bytes: int) -> str:
-    for unit, size in (("GiB", 2**30), ("MiB", 2**20), ("KiB", 2**10)):
-        if size_bytes >= size:
-            return f"{size_bytes / size:.1f} {unit}"
-    return f"{size_bytes} B"
-
-
-def _date(stamp_ns: int) -> str:
+def _date(stamp_ns: int, *, simulated: bool) -> str:
     seconds, nanoseconds = divmod(stamp_ns, 10**9)
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.gmtime(seconds))
-    return f"{when} UTC ({seconds}.{nanoseconds:09d})"
+    return f"{when} UTC ({seconds}.{nanoseconds:09d}){', simulated time' if simulated else ''}"

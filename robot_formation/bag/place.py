@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import socket
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 
@@ -15,8 +17,13 @@ CUT_OFF_SUFFIX = ".cut_off"
 """What the folder of a bag whose writer died is called while the bag is being rescued."""
 
 
+def recover_hint(partial_path: Path) -> str:
+    """Say how to save what is in a bag that could not be finished."""
+    return f" ('formation recover {partial_path}' saves what was written)"
+
+
 def check_free(path: Path, leftovers: tuple[str, ...] = (PARTIAL_SUFFIX, CUT_OFF_SUFFIX)) -> None:
-    """Refuse a bag's path that is taken, by a bag or by what is left of one.
+    """Refuse a bag's path that is taken, by a bag or by what is left of one; also by a link that leads nowhere.
 
     Raises:
         BagError: naming what is there.
@@ -25,7 +32,7 @@ def check_free(path: Path, leftovers: tuple[str, ...] = (PARTIAL_SUFFIX, CUT_OFF
         raise BagError(f"{path} can't be a bag: give the name of a new folder")
     for suffix in ("", *leftovers):
         taken = path.with_name(path.name + suffix)
-        if taken.exists():
+        if os.path.lexists(taken):
             raise BagError(f"{taken} exists already and is not overwritten; choose another path or remove it")
 
 
@@ -37,21 +44,54 @@ class PathReservation:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path.absolute()
+        self.path = path.absolute()
         self._socket: socket.socket | None = None
 
-    def __enter__(self) -> PathReservation:
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        name = hashlib.sha256(str(self._path).encode()).hexdigest()
+    def take(self) -> bool:
+        """Take the path; False if somebody has it. Entering it again later changes nothing."""
+        if self._socket is not None:
+            return True
+        taken = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        name = hashlib.sha256(str(self.path).encode()).hexdigest()
         try:
-            self._socket.bind(f"\0robot_formation_bag_{name}")
+            taken.bind(f"\0robot_formation_bag_{name}")
         except OSError:
+            taken.close()
+            return False
+        self._socket = taken
+        return True
+
+    def release(self) -> None:
+        """Let others have the path."""
+        if self._socket is not None:
             self._socket.close()
-            raise BagError(f"{self._path} is being written by another run; choose another path") from None
+            self._socket = None
+
+    def __enter__(self) -> PathReservation:
+        if not self.take():
+            raise BagError(f"{self.path} is being written by another run; choose another path")
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._socket is not None:
-            self._socket.close()
+        self.release()
+
+
+def reserve_new(folder: Path, stem: str) -> PathReservation:
+    """Reserve the first free name of STEM, STEM_2, STEM_3, ... in a folder, so that no other run can choose it too.
+
+    Returns:
+        The reservation, taken already; enter it, or release it.
+    """
+    for number in count(1):
+        reservation = PathReservation(folder / (stem if number == 1 else f"{stem}_{number}"))
+        if not reservation.take():
+            continue
+        try:
+            check_free(reservation.path)
+        except BagError:
+            reservation.release()
+            continue
+        return reservation
+    raise AssertionError("never reached: the count has no end")

@@ -14,7 +14,8 @@ from types import TracebackType
 import numpy as np
 
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.reader import Bag, RawMessage
+from robot_formation.bag.reader import Bag
+from robot_formation.bag.source import RawMessage
 
 _BATCH = 64
 _BATCHES = 32

@@ -9,6 +9,8 @@ from typing import Any
 import yaml
 
 from robot_formation.bag.errors import BagError
+from robot_formation.errors import shown
+from robot_formation.yaml_files import YamlError, parse_yaml
 
 INFINITE_NS = 2**63 - 1
 """RMW_DURATION_INFINITE in nanoseconds: what a publisher without deadline, lifespan or lease reports."""
@@ -50,7 +52,7 @@ class TopicQos:
     def __post_init__(self) -> None:
         for policy, choices in _CHOICES.items():
             if getattr(self, policy) not in choices:
-                raise BagError(f"QoS {policy} can't be {getattr(self, policy)!r}; there are: {', '.join(choices)}")
+                raise BagError(f"QoS {policy} can't be {shown(getattr(self, policy))}; there are: {', '.join(choices)}")
         if self.depth < 0:
             raise BagError(f"QoS depth can't be {self.depth}; it must be 0 or more")
 
@@ -81,8 +83,8 @@ def parse_profiles(text: str) -> tuple[TopicQos, ...]:
         BagError: the text isn't a list of QoS profiles.
     """
     try:
-        return tuple(_profile(item) for item in yaml.safe_load(text) or ())
-    except (yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+        return tuple(_profile(item) for item in parse_yaml(text) or ())
+    except (YamlError, KeyError, TypeError, AttributeError) as error:
         raise BagError(f"the bag holds QoS profiles that can't be read ({type(error).__name__})") from error
 
 

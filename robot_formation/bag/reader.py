@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Collection, Iterator
+import heapq
+import logging
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
-from mcap.reader import make_reader
-from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
+from robot_formation.bag.chunks import unpacked_message
 from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.folder import FolderMetadata, readable, storage_of
+from robot_formation.bag.mcap_source import McapSource
 from robot_formation.bag.metadata import TopicSummary
-from robot_formation.bag.place import PARTIAL_SUFFIX
-from robot_formation.bag.qos import TopicQos
-from robot_formation.bag.recover import in_order, mcap_files, recover
+from robot_formation.bag.source import RawMessage, Source
+from robot_formation.bag.sqlite_source import SqliteSource
+from robot_formation.errors import shown
 
-_STORAGES = (".mcap", ".db3")
-_END_MAGIC = b"\x89MCAP0\r\n"
+_LOG = logging.getLogger(__name__)
+_IDL_FILE = "=" * 80 + "\n"
 
 
 class BagMessage(NamedTuple):
@@ -32,77 +36,59 @@ class BagMessage(NamedTuple):
     message: Any
 
 
-class RawMessage(NamedTuple):
-    """One message as it was recorded: topic, type, the bag's stamp (log time, nanoseconds), and its CDR."""
-
-    topic: str
-    type_name: str
-    stamp_ns: int
-    cdr: bytes
-
-
 class Bag:
     """An open bag; use it as a context manager. Made by `read_bag`.
 
     Attributes:
         path: what was asked for.
         recovered: the bag had not been closed by its writer.
+        contents: every declared topic with its number of messages, sorted by name; empty topics included.
+        message_count: messages in the bag.
+        start_ns: stamp of the first message, nanoseconds; 0 in an empty bag.
+        end_ns: stamp of the last message, nanoseconds; 0 in an empty bag.
+        warnings: what is wrong with the bag though it can be read, a line each.
     """
 
     def __init__(
-        self, path: Path, reader: AnyReader, records: list[tuple[str, dict[str, str]]], stack: ExitStack
+        self,
+        path: Path,
+        sources: Sequence[Source],
+        metadata: FolderMetadata | None,
+        stack: ExitStack,
+        *,
+        recovered: bool,
     ) -> None:
         self.path = path
-        self.recovered = False
-        self._reader = reader
-        self._records = records
+        self.recovered = recovered
+        self._sources = sources
+        self._metadata = metadata or FolderMetadata(())
         self._stack = stack
+        self._typestore = _typestore(sources)
+        self.contents = _merged(sources, self._metadata)
+        filled = [source for source in sources if source.message_count]
+        self.message_count = sum(source.message_count for source in filled)
+        self.start_ns = min((source.start_ns for source in filled), default=0)
+        self.end_ns = max((source.end_ns for source in filled), default=0)
+        self.warnings = [f"{path}: {warning}" for source in sources for warning in source.warnings]
+        if metadata is not None and not recovered:
+            self.warnings += _differences(path, metadata, self.contents)
 
     @property
     def topics(self) -> dict[str, str]:
         """Topics that hold at least one message, with their message types."""
-        return {connection.topic: connection.msgtype for connection in self._reader.connections if connection.msgcount}
-
-    @property
-    def contents(self) -> list[TopicSummary]:
-        """Every declared topic with its number of messages, sorted by name; empty topics included."""
-        found: dict[str, TopicSummary] = {}
-        for connection in sorted(self._reader.connections, key=lambda connection: str(connection.topic)):
-            offered = tuple(_qos(profile) for profile in connection.ext.offered_qos_profiles)
-            topic = TopicSummary(
-                connection.topic, connection.msgtype, connection.digest, offered, int(connection.msgcount)
-            )
-            known = found.setdefault(connection.topic, topic)
-            if known is not topic:  # one channel per file, or per publisher
-                known.message_count += topic.message_count
-                known.profiles += tuple(profile for profile in offered if profile not in known.profiles)
-        return list(found.values())
+        return {topic.name: topic.type_name for topic in self.contents if topic.message_count}
 
     @property
     def ros_distro(self) -> str:
         """ROS distribution that recorded the bag; empty if it doesn't say."""
-        return next((str(reader.ros_distro) for reader in self._reader.readers if reader.ros_distro), "")
+        return self._metadata.ros_distro
 
     @property
-    def outer_compression(self) -> str:
-        """rosbag2's own compression of the bag, of whole files or of single messages; empty for none."""
-        kinds = {(reader.compression_format, reader.compression_mode) for reader in self._reader.readers}
-        return ", ".join(f"{form} ({mode})" for form, mode in sorted(kinds, key=str) if mode)
-
-    @property
-    def message_count(self) -> int:
-        """Messages in the bag."""
-        return int(self._reader.message_count)
-
-    @property
-    def start_ns(self) -> int:
-        """Stamp of the first message, nanoseconds; 0 in an empty bag."""
-        return int(self._reader.start_time) if self.message_count else 0
-
-    @property
-    def end_ns(self) -> int:
-        """Stamp of the last message, nanoseconds; 0 in an empty bag."""
-        return int(self._reader.end_time) - 1 if self.message_count else 0
+    def compression(self) -> str:
+        """How the bag is compressed: rosbag2's own way and mode, or that of its chunks; `none` without."""
+        if self._metadata.compression_mode:
+            return f"{self._metadata.compression_format} ({self._metadata.compression_mode})"
+        return ", ".join(sorted(set().union(*(source.compressions for source in self._sources)))) or "none"
 
     @property
     def duration_s(self) -> float:
@@ -112,16 +98,17 @@ class Bag:
     def metadata(self, name: str) -> dict[str, str]:
         """Return the MCAP metadata of this name; later records add to and replace values of earlier ones."""
         merged: dict[str, str] = {}
-        for found, values in self._records:
-            if found == name:
-                merged.update(values)
+        for source in self._sources:
+            for found, values in source.records:
+                if found == name:
+                    merged.update(values)
         return merged
 
     def require(self, types: dict[str, str]) -> None:
-        """Check that the topics are there with these message types.
+        """Check that the topics are there with these message types of ROS 2 Jazzy.
 
         Raises:
-            BagError: naming the first topic that is missing or of another type.
+            BagError: naming the first topic that is missing, of another type, or whose type has other fields.
         """
         there = self.topics
         for topic, type_name in types.items():
@@ -129,16 +116,26 @@ class Bag:
                 raise BagError(f"{self.path} has no messages on '{topic}', which is needed; record that topic too")
             if there[topic] != type_name:
                 raise BagError(f"{self.path}: '{topic}' is {there[topic]}, but {type_name} is needed")
+            if self._hash(type_name) != jazzy_typestore().hash_rihs01(type_name):
+                raise BagError(
+                    f"{self.path}: '{topic}' is a {type_name} with other fields than in ROS 2 Jazzy; it can't be used"
+                )
+
+    def _hash(self, type_name: str) -> Any:
+        try:
+            return self._typestore.hash_rihs01(type_name)
+        except Exception:  # rosbags' type store has no common error
+            return None
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Yield the messages of these topics in the order of their stamps.
 
         Raises:
-            BagError: the bag is corrupted.
+            BagError: the bag is corrupted, or holds less than it says.
         """
         for raw in self.raw_messages(topics):
             try:
-                message = self._reader.deserialize(raw.cdr, raw.type_name)
+                message = self._typestore.deserialize_cdr(raw.cdr, raw.type_name)
             except Exception as error:  # rosbags' decoders have no common error
                 raise _corrupted(self.path, error) from error
             yield BagMessage(raw.topic, raw.type_name, raw.stamp_ns, message)
@@ -154,21 +151,36 @@ class Bag:
             stop_ns: leave out this and what is later.
 
         Raises:
-            BagError: the bag is corrupted.
+            BagError: the bag is corrupted, or holds less than it says.
         """
-        connections = [connection for connection in self._reader.connections if connection.topic in topics]
-        if not connections:
-            return
-        found = self._reader.messages(connections=connections, start=start_ns, stop=stop_ns)
+        wanted = set(topics)
+        single = self._metadata.compression_mode == "message"
+        counted: Counter[str] = Counter()
+        found = heapq.merge(
+            *(source.messages(wanted, start_ns, stop_ns) for source in self._sources), key=lambda raw: raw.stamp_ns
+        )
         while True:
             try:
-                connection, stamp_ns, data = next(found)
-            except StopIteration:
-                return
-            # rosbags lets errors of its decompressors through, which have no common base.
+                raw = next(found, None)
+                if raw is not None and single:
+                    raw = raw._replace(cdr=unpacked_message(raw.cdr))
+            # The libraries' errors have no common base.
             except Exception as error:
                 raise _corrupted(self.path, error) from error
-            yield RawMessage(connection.topic, connection.msgtype, stamp_ns, bytes(data))
+            if raw is None:
+                break
+            counted[raw.topic] += 1
+            yield raw
+        if (start_ns is None or start_ns <= self.start_ns) and (stop_ns is None or stop_ns > self.end_ns):
+            self._check_complete(wanted, counted)
+
+    def _check_complete(self, wanted: Collection[str], counted: Counter[str]) -> None:
+        for topic in self.contents:
+            if topic.name in wanted and counted[topic.name] < topic.message_count:
+                raise BagError(
+                    f"{self.path} says that it holds {topic.message_count} messages on '{topic.name}', but only "
+                    f"{counted[topic.name]} can be read; 'formation recover' saves what is whole"
+                )
 
     def close(self) -> None:
         """Close the bag and remove what was recovered for reading."""
@@ -187,7 +199,8 @@ def read_bag(path: str | Path, *, allow_empty: bool = False) -> Bag:
     """Open a bag: a finished folder, one .mcap or .db3 file, or one whose writer was killed.
 
     An unclosed bag (a `.partial` folder, a folder without metadata.yaml, an MCAP file without its end) is recovered
-    into a temporary folder, which is removed when the bag is closed.
+    into a temporary folder, which is removed when the bag is closed. So is one whose files were compressed as a whole.
+    What is wrong with a bag that can be read is logged, once each.
 
     Args:
         path: the bag.
@@ -199,86 +212,78 @@ def read_bag(path: str | Path, *, allow_empty: bool = False) -> Bag:
     asked = Path(path)
     stack = ExitStack()
     try:
-        readable = _recovered(asked, stack) if _is_unclosed(asked) else asked
-        # SQLite bags without metadata.yaml: their writer was killed, but the files are whole.
-        loose = readable.is_dir() and not (readable / "metadata.yaml").exists()
-        reader = AnyReader(storage_files(readable) if loose else [readable], default_typestore=jazzy_typestore())
-        stack.enter_context(reader)
-        bag = Bag(asked, reader, _metadata_records(readable), stack)
+        found = readable(asked, stack)
+        sources: list[Source] = []
+        for file in found.files:
+            source: Source = McapSource(file) if storage_of(file) == ".mcap" else SqliteSource(file)
+            stack.callback(source.close)
+            sources.append(source)
+        bag = Bag(asked, sources, found.metadata, stack, recovered=found.recovered)
         if bag.message_count == 0 and not allow_empty:
             raise BagError(f"{asked} is empty: it holds no messages")
-    except Exception as error:
+    except Exception as error:  # rosbags, mcap and SQLite have no common error
         stack.close()
         raise _corrupted(asked, error) from error
-    bag.recovered = readable is not asked
+    except BaseException:
+        stack.close()
+        raise
+    for warning in bag.warnings:
+        _LOG.warning("warning: %s", warning)
     return bag
 
 
-def storage_files(path: Path) -> list[Path]:
-    """List a bag's storage files in order, whichever storage it is."""
-    if not path.is_dir():
-        return [path]
-    return sorted((file for kind in _STORAGES for file in path.glob(f"*{kind}*")), key=in_order)
+def _typestore(sources: Sequence[Source]) -> Any:
+    """Collect the definitions of a bag's message types; those of Jazzy, if it has none."""
+    definitions = {name: found for source in sources for name, found in source.definitions.items()}
+    if not definitions:
+        return jazzy_typestore()
+    store = get_typestore(Stores.EMPTY)
+    types: dict[str, Any] = {}
+    for name, (encoding, text) in definitions.items():
+        if encoding == "ros2msg":
+            types.update(get_types_from_msg(text, name))
+        elif encoding in ("ros2idl", "omgidl"):
+            # Several files in one text, each below a line that names it; or a single one.
+            parts = [part.partition("\n")[2] for part in text.split(_IDL_FILE)[1:]]
+            for part in parts or [text]:
+                types.update(get_types_from_idl(part))
+        else:
+            raise BagError(f"the definition of {shown(name)} is written in {shown(encoding)}, which can't be read")
+    store.register(types)
+    return store
 
 
-def bag_name(path: str | Path) -> str:
-    """Return a bag's name without the suffixes of unclosed bags and storage files."""
-    name = Path(path).resolve().name
-    for suffix in (PARTIAL_SUFFIX, ".mcap", ".db3"):
-        name = name.removesuffix(suffix)
-    return name
+def _merged(sources: Sequence[Source], metadata: FolderMetadata) -> list[TopicSummary]:
+    """Add up the channels of a bag's files by topic."""
+    found: dict[str, TopicSummary] = {}
+    for channel in sorted((channel for source in sources for channel in source.channels), key=lambda c: c.name):
+        type_hash = channel.type_hash or metadata.type_hashes.get(channel.name, "")
+        new = TopicSummary(channel.name, channel.type_name, type_hash, channel.profiles, channel.message_count)
+        known = found.setdefault(channel.name, new)
+        if known is not new:  # one channel per file, or per publisher
+            known.message_count += new.message_count
+            known.profiles += tuple(profile for profile in new.profiles if profile not in known.profiles)
+            if new.type_name not in known.type_name.split(" and "):
+                known.type_name += f" and {new.type_name}"  # what `require` refuses
+    return list(found.values())
 
 
-def _is_unclosed(path: Path) -> bool:
-    """Tell whether a bag was never closed by its writer; check on the way that it is one."""
-    if path.exists() and (path.suffix == ".db3" or (path.is_dir() and any(path.glob("*.db3")))):
-        return False
-    if path.is_dir() and not (path / "metadata.yaml").exists():
-        return bool(mcap_files(path))
-    return any(_lacks_end(file) for file in mcap_files(path))
-
-
-def _lacks_end(file: Path) -> bool:
-    """Tell whether an MCAP file begins as one but doesn't end as one."""
-    with file.open("rb") as stream:
-        head = stream.read(len(_END_MAGIC))
-        stream.seek(max(0, file.stat().st_size - len(_END_MAGIC)))
-        return head == _END_MAGIC and (stream.tell() == 0 or stream.read() != _END_MAGIC)
-
-
-def _recovered(path: Path, stack: ExitStack) -> Path:
-    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="robot_formation_")))
-    return recover(path, folder / bag_name(path)).path
-
-
-def _metadata_records(path: Path) -> list[tuple[str, dict[str, str]]]:
-    files = sorted(path.glob("*.mcap"), key=in_order) if path.is_dir() else [path] if path.suffix == ".mcap" else []
-    records: list[tuple[str, dict[str, str]]] = []
-    for file in files:
-        with file.open("rb") as stream:
-            records.extend((record.name, record.metadata) for record in make_reader(stream).iter_metadata())
-    return records
-
-
-def _qos(profile: Any) -> TopicQos:
-    """Convert rosbags' profile."""
-    times = (profile.deadline, profile.lifespan, profile.liveliness_lease_duration)
-    deadline_ns, lifespan_ns, lease_ns = (time.sec * 10**9 + time.nsec for time in times)
-    return TopicQos(
-        profile.history.name.lower(),
-        max(0, profile.depth),
-        profile.reliability.name.lower(),
-        profile.durability.name.lower(),
-        deadline_ns,
-        lifespan_ns,
-        "unknown" if profile.liveliness.name == "MANUAL_BY_NODE" else profile.liveliness.name.lower(),
-        lease_ns,
-        profile.avoid_ros_namespace_conventions,
-    )
+def _differences(path: Path, metadata: FolderMetadata, contents: Sequence[TopicSummary]) -> list[str]:
+    """Say if a folder's metadata count other messages than its files hold."""
+    there = {topic.name: topic.message_count for topic in contents}
+    names = [name for name in {**metadata.counts, **there} if metadata.counts.get(name, 0) != there.get(name, 0)]
+    if not names:
+        return []
+    return [
+        f"{path}: metadata.yaml counts {metadata.counts.get(names[0], 0)} messages on '{names[0]}', the bag's files "
+        f"hold {there.get(names[0], 0)} (topics that differ: {len(names)}); 'ros2 bag reindex' counts them anew"
+    ]
 
 
 def _corrupted(path: Path, error: Exception) -> BagError:
-    if isinstance(error, BagError):
+    if isinstance(error, BagError) and str(error).startswith(str(path)):
         return error
+    if isinstance(error, OSError) and error.strerror:
+        return BagError(f"{path} can't be read: {error.filename or path}: {error.strerror}")
     reason = " ".join(str(error).split()).rstrip(".") or type(error).__name__
     return BagError(f"{path} can't be read: {reason}; it may be damaged, or no bag")

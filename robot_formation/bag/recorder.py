@@ -19,7 +19,8 @@ class Recorder:
     """Writes messages into a bag.
 
     Their log time is simulated: their own stamp, or the latest one seen before them; or, where `record` is told when
-    they came, that time. It adds /tf and /tf_static, made of true poses and robot descriptions, when it ends a chunk.
+    they came, that time. It adds /tf and /tf_static, made of true poses and robot descriptions, when it ends a chunk,
+    unless such a topic was declared before; one that is declared later is recorded beside them, in the same topic.
     """
 
     def __init__(self, path: Path, metadata: Mapping[str, str], options: WriteOptions = DEFAULT_OPTIONS) -> None:
@@ -38,7 +39,7 @@ class Recorder:
         if metadata:
             self._writer.write_metadata(METADATA_NAME, metadata)
         self._topics: set[str] = set()
-        self._own: set[str] = set()
+        self._own: dict[str, str] = {}  # topics made here, and their types
         self._transforms = Transforms()
         self._now_ns = 0
 
@@ -65,8 +66,13 @@ class Recorder:
     def add_topic(
         self, name: str, type_name: str, qos: TopicQos | tuple[TopicQos, ...], *, embedded: Definition | None = None
     ) -> None:
-        """Declare a topic once; arguments as for `BagWriter.add_topic`."""
-        self._writer.add_topic(name, type_name, qos, embedded=embedded)
+        """Declare a topic once; arguments as for `BagWriter.add_topic`.
+
+        Raises:
+            BagError: the topic was declared before, or it is one that the recorder adds and its type is another.
+        """
+        if self._own.get(name) != type_name:
+            self._writer.add_topic(name, type_name, qos, embedded=embedded)
         self._topics.add(name)
 
     def record(self, topic: str, type_name: str, cdr: bytes, received_ns: int | None = None) -> None:
@@ -118,7 +124,7 @@ class Recorder:
                     continue  # somebody publishes it
                 q = topic.qos
                 self.add_topic(topic.name, topic.type, TopicQos(q.history, q.depth, q.reliability, q.durability))
-                self._own.add(topic.name)
+                self._own[topic.name] = topic.type
             self._writer.write(topic.name, cdr, stamp_ns)
 
 

@@ -12,13 +12,16 @@ from typing import Any
 
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Header, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
 
+from robot_formation.bag.chunks import chunk_records
 from robot_formation.bag.definitions import Definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.metadata import Span
-from robot_formation.bag.qos import parse_profiles
+from robot_formation.bag.qos import TopicQos, parse_profiles
+from robot_formation.bag.records import MAGIC, records
 from robot_formation.bag.writer import BagWriter
+from robot_formation.errors import shown
+from robot_formation.files import open_file
 
 RECOVERING_SUFFIX = ".recovering"
 """What the new bag's folder is called behind its name while the old one is being copied into it."""
@@ -98,6 +101,8 @@ def mcap_files(path: Path) -> list[Path]:
     if not path.exists():
         raise BagError(f"{path} doesn't exist; give a bag's folder or an .mcap file")
     files = sorted(path.glob("*.mcap"), key=in_order) if path.is_dir() else [path]
+    if path.name.endswith(".zstd") or (not files and any(path.glob("*.zstd"))):
+        raise BagError(f"{path} holds files that were compressed as a whole; unpack them with 'zstd -d' first")
     if not files or files[0].suffix != ".mcap":
         raise BagError(f"{path} is not a bag; give a folder that 'ros2 bag' or this project wrote, or an .mcap file")
     return files
@@ -110,7 +115,7 @@ def is_being_written(path: Path) -> bool:
         BagError: as for `mcap_files`.
     """
     for file in mcap_files(path):
-        with file.open("rb") as stream:
+        with open_file(file) as stream:
             try:
                 fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -145,12 +150,12 @@ class _Copy:
         """Copy one file up to its end or to the first record that is cut off."""
         self.schemas.clear()
         self.channels.clear()
-        with file.open("rb") as stream:
+        with open_file(file) as stream:
             readable = 0
             finished = False
             for record in _readable_records(stream):
                 if isinstance(record, Header) and record.profile != "ros2":
-                    raise BagError(f"{file} is an MCAP file of profile '{record.profile}', not of ROS 2")
+                    raise BagError(f"{file} is an MCAP file of profile {shown(record.profile)}, not of ROS 2")
                 self.take(record)
                 readable = stream.tell()
                 finished = isinstance(record, DataEnd)
@@ -176,7 +181,7 @@ class _Copy:
 
     def unpack(self, chunk: Chunk) -> list[Any]:
         try:
-            return list(breakup_chunk(chunk, validate_crc=True))
+            return chunk_records(chunk)
         # Besides MCAP's own errors the decompressors raise theirs, which have no common base.
         except Exception:
             self.damaged_chunks += 1
@@ -194,11 +199,12 @@ class _Copy:
         if self.types.setdefault(channel.topic, schema.name) != schema.name:
             return
         if channel.topic not in self.writer.message_counts:
-            embedded = Definition(
-                schema.name, schema.encoding, schema.data.decode(), channel.metadata.get("topic_type_hash", "")
-            )
-            profiles = parse_profiles(channel.metadata.get("offered_qos_profiles", ""))
-            self.writer.add_topic(channel.topic, schema.name, profiles, embedded=embedded)
+            try:
+                text = schema.data.decode()
+            except UnicodeDecodeError:
+                return
+            embedded = Definition(schema.name, schema.encoding, text, channel.metadata.get("topic_type_hash", ""))
+            self.writer.add_topic(channel.topic, schema.name, _profiles(channel), embedded=embedded)
         self.writer.write(channel.topic, message.data, message.publish_time, log_time_ns=message.log_time)
         self.span.include(message.log_time)
 
@@ -209,18 +215,27 @@ class _Copy:
             self.waiting_metadata.clear()
 
 
+def _profiles(channel: Channel) -> tuple[TopicQos, ...]:
+    try:
+        return parse_profiles(channel.metadata.get("offered_qos_profiles", ""))
+    except BagError:  # the messages are worth more
+        return ()
+
+
 def _readable_records(stream: Any) -> Iterator[Any]:
     """Yield a file's records, whole ones only, up to the end of its data section or of what is there."""
     try:
-        for record in StreamReader(stream, emit_chunks=True).records:
+        if stream.read(len(MAGIC)) != MAGIC:
+            return
+        for record in records(stream, len(MAGIC)):
             yield record
             if isinstance(record, DataEnd):
                 return
     # A cut-off or overwritten record shows as an end of file, a short field, an absurd length or a broken text.
-    except (McapError, struct.error, UnicodeDecodeError, ValueError, MemoryError, OverflowError):
+    except (McapError, struct.error, ValueError, MemoryError, OverflowError):
         return
 
 
 def _has_magic(file: Path) -> bool:
-    with file.open("rb") as stream:
-        return stream.read(8) == b"\x89MCAP0\r\n"
+    with open_file(file) as stream:
+        return stream.read(len(MAGIC)) == MAGIC

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from robot_formation.bag.errors import BagError
-from robot_formation.names import IMAGE_TYPE
+from robot_formation.names import DIAGNOSTICS, IMAGE_TYPE
 from robot_formation.parameters import suggestion
 
 _IMAGE_TYPES = (IMAGE_TYPE, "sensor_msgs/msg/CompressedImage")
@@ -22,6 +22,7 @@ class Selection:
         regex: those that it matches as a whole are chosen too.
         exclude: those that it matches as a whole are left out, unless they are named in `topics`.
         images: whether pictures that are not named in `topics` may be chosen.
+        namespace: where those lie that are not named in `topics`, and `/diagnostics`, which all share; empty: anywhere.
 
     Raises:
         BagError: one of the expressions is no regular expression.
@@ -31,6 +32,7 @@ class Selection:
     regex: str = ""
     exclude: str = ""
     images: bool = True
+    namespace: str = ""
     _regex: re.Pattern[str] = field(init=False, repr=False, compare=False)
     _exclude: re.Pattern[str] = field(init=False, repr=False, compare=False)
 
@@ -52,6 +54,8 @@ class Selection:
         """
         if topic in self.topics:
             return True
+        if self.namespace and not topic.startswith(f"{self.namespace}/") and topic != DIAGNOSTICS.name:
+            return False
         if self.exclude and self._exclude.fullmatch(topic):
             return False
         if type_name in _IMAGE_TYPES and not self.images:

@@ -1,7 +1,8 @@
-"""Transforms for viewers, made from what a bag holds anyway: true poses and robot descriptions.
+"""Transforms for viewers, made from what a run publishes anyway: true poses and robot descriptions.
 
 `/tf` has world -> <robot>/base_link at every true pose. `/tf_static` has the frames of each robot's description (wheels
-at rest) and world -> <robot>/odom, where the robot started.
+at rest) and world -> <robot>/odom, where the robot started. Both lie in the formation's namespace: formations have
+frames of the same names.
 """
 
 from __future__ import annotations
@@ -9,21 +10,24 @@ from __future__ import annotations
 import math
 import re
 import xml.etree.ElementTree as ElementTree
+from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from robot_formation import names
 from robot_formation.bag.definitions import jazzy_typestore
 
-_POSES = re.compile(r".*/ground_truth/([^/]+)/odom")
-_DESCRIPTIONS = re.compile(r".*/([^/]+)/robot_description")
+_POSES = re.compile(r"(.*)/ground_truth/([^/]+)/odom")
+_DESCRIPTIONS = re.compile(r"(.*)/([^/]+)/robot_description")
 _ODOMETRY, _STRING = "nav_msgs/msg/Odometry", "std_msgs/msg/String"
 
 Vector = tuple[float, float, float]
+_MOST_CHARACTERS = 10_000_000
 
 
 class TransformMessage(NamedTuple):
-    """One serialised message of `/tf` or `/tf_static`."""
+    """One serialised message of `/tf` or `/tf_static`; the topic's name is absolute."""
 
     topic: names.Topic
     cdr: bytes
@@ -31,37 +35,51 @@ class TransformMessage(NamedTuple):
 
 
 class Transforms:
-    """Collects messages as they are recorded, cheaply, and makes transforms of them when asked."""
+    """Collects messages as they come, cheaply, and makes transforms of them when asked."""
 
     def __init__(self) -> None:
-        self._taken: list[tuple[str, str, bytes, int]] = []
-        self._static: dict[str, Any] = {}
+        self._taken: list[tuple[str, str, str, bytes, int]] = []
+        self._static: defaultdict[str, dict[str, Any]] = defaultdict(dict)  # by namespace and child frame
 
     def take(self, topic: str, type_name: str, cdr: bytes, stamp_ns: int) -> None:
         """Keep a message if it says where a frame is."""
-        pattern = {_ODOMETRY: _POSES, _STRING: _DESCRIPTIONS}.get(type_name)
-        if pattern is not None and (match := pattern.fullmatch(topic)):
-            self._taken.append((match[1], type_name, cdr, stamp_ns))
+        if match := _matched(topic, type_name):
+            self._taken.append((match[1], match[2], type_name, cdr, stamp_ns))
+
+    @staticmethod
+    def wants(topic: str, type_name: str) -> bool:
+        """Tell whether messages of a topic say where frames are."""
+        return _matched(topic, type_name) is not None
 
     def make(self) -> Iterator[TransformMessage]:
         """Make the transforms of what was taken since the last time."""
         taken, self._taken = self._taken, []
-        new: list[int] = []
-        for robot, type_name, cdr, stamp_ns in taken:
+        new: defaultdict[str, list[int]] = defaultdict(list)
+        for namespace, robot, type_name, cdr, stamp_ns in taken:
             message = jazzy_typestore().deserialize_cdr(cdr, type_name)
             if type_name == _STRING:
                 fixed = list(_of_description(robot, message.data))
             else:
                 transform = _of_odometry(message)
-                yield _message(names.TF, [transform], stamp_ns)
+                yield _message(_inside(namespace, names.TF), [transform], stamp_ns)
                 fixed = [_transform(message.header, f"{robot}/{names.ODOM_FRAME}", transform.transform)]
             for transform in fixed:
-                if transform.child_frame_id not in self._static:
-                    self._static[transform.child_frame_id] = transform
-                    new.append(stamp_ns)
+                if transform.child_frame_id not in self._static[namespace]:
+                    self._static[namespace][transform.child_frame_id] = transform
+                    new[namespace].append(stamp_ns)
         # All of them each time: whoever asks for the latest message on a latched topic gets one only.
-        if new:
-            yield _message(names.TF_STATIC, list(self._static.values()), min(new))
+        for namespace, stamps in new.items():
+            yield _message(_inside(namespace, names.TF_STATIC), list(self._static[namespace].values()), min(stamps))
+
+
+def _matched(topic: str, type_name: str) -> re.Match[str] | None:
+    """Match a topic that is used: groups are the formation's namespace and the robot."""
+    pattern = {_ODOMETRY: _POSES, _STRING: _DESCRIPTIONS}.get(type_name)
+    return None if pattern is None else pattern.fullmatch(topic)
+
+
+def _inside(namespace: str, topic: names.Topic) -> names.Topic:
+    return replace(topic, name=names.absolute(namespace, topic.name))
 
 
 def _of_odometry(message: Any) -> Any:
@@ -75,9 +93,11 @@ def _of_odometry(message: Any) -> Any:
 def _of_description(robot: str, text: str) -> Iterator[Any]:
     """Make one transform per joint of a URDF; a text that is none gives none."""
     types = jazzy_typestore().types
+    if len(text) > _MOST_CHARACTERS or "<!DOCTYPE" in text:
+        return  # a description declares no entities, which small texts can make huge
     try:
-        joints = ElementTree.fromstring(text).iter("joint")
-    except ElementTree.ParseError:
+        joints = list(ElementTree.fromstring(text).iter("joint"))
+    except (ElementTree.ParseError, ValueError):
         return
     for joint in joints:
         parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
@@ -85,7 +105,10 @@ def _of_description(robot: str, text: str) -> Iterator[Any]:
             continue
         place, turn = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         if origin is not None:
-            place, turn = _vector(origin.get("xyz", "0 0 0")), _vector(origin.get("rpy", "0 0 0"))
+            try:
+                place, turn = _vector(origin.get("xyz", "0 0 0")), _vector(origin.get("rpy", "0 0 0"))
+            except ValueError:  # neither three nor numbers
+                continue
         header = types["std_msgs/msg/Header"](
             types["builtin_interfaces/msg/Time"](0, 0), f"{robot}/{parent.get('link', '')}"
         )

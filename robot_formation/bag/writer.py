@@ -14,7 +14,7 @@ from robot_formation.bag.definitions import Definition, definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.mcap_file import CHUNK_BYTES, COMPRESSIONS, McapFile
 from robot_formation.bag.metadata import bag_information, merged, to_yaml
-from robot_formation.bag.place import PARTIAL_SUFFIX, check_free
+from robot_formation.bag.place import PARTIAL_SUFFIX, check_free, recover_hint
 from robot_formation.bag.qos import TopicQos
 
 _LAST_STAMP_NS = 2**63 - 1
@@ -293,6 +293,6 @@ class BagWriter:
         if hasattr(self, "_file"):
             self._file.abandon()
         if hasattr(self, "_file") and self.partial_path.suffix == PARTIAL_SUFFIX:
-            text += f" ('formation recover {self.partial_path}' saves what was written)"
+            text += recover_hint(self.partial_path)
         self._failure = BagError(text)
         return self._failure

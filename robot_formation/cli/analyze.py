@@ -21,6 +21,9 @@ def add_parser(subparsers: Any) -> None:
         "--json", action="store_true", help="print JSON and nothing else; pictures are drawn only if --out is given"
     )
     parser.add_argument("--no-pictures", action="store_true", help="draw no pictures")
+    parser.add_argument(
+        "--namespace", metavar="NS", help="the formation's namespace, where the bag holds several formations"
+    )
     parser.set_defaults(run=run)
 
 
@@ -31,17 +34,20 @@ def run(args: argparse.Namespace) -> int:
         FormationError: the bag can't be read or has no run, or the pictures can't be written.
     """
     # Imported here, so that the other verbs don't pay for rosbags.
+    from robot_formation.analysis.conditions import run_facts
     from robot_formation.analysis.from_bag import load_run
     from robot_formation.analysis.quantities import analyse
     from robot_formation.analysis.report import pictures_folder, text_report, to_json, write_pictures
 
-    record = load_run(args.bag)
+    record = load_run(args.bag, args.namespace)
     analysis = analyse(record)
-    print(to_json(analysis) if args.json else text_report(record, analysis))
-    if args.no_pictures or (args.json and args.out is None):
-        return 0
-    folder = args.out or pictures_folder(args.bag)
-    pictures = write_pictures(record, analysis, folder)
     if not args.json:
+        print(text_report(record, analysis))
+    drawn = not args.no_pictures and not (args.json and args.out is None)
+    pictures = write_pictures(record, analysis, args.out or pictures_folder(args.bag)) if drawn else []
+    if args.json:
+        files = {"bag": str(args.bag), "pictures": [str(picture) for picture in pictures]}
+        print(to_json(analysis, {**run_facts(record.details), **files, "reason": None}))
+    elif pictures:
         print("\npictures: " + ", ".join(str(picture) for picture in pictures))
     return 0

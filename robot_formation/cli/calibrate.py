@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.cli.calibrate_vision import DESCRIPTION as VISION_DESCRIPTION
 from robot_formation.cli.calibrate_vision import add_options as add_vision_options
 from robot_formation.cli.calibrate_vision import run_vision
+from robot_formation.cli.parser import whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--track", metavar="NAME", help="preset track whose robots are measured: one, two (default), ...")
     what.add_argument("--scenario", metavar="FILE", type=Path, help="scenario file whose robots are measured")
-    parser.add_argument("--seed", metavar="N", type=int, help="seed that the robots are drawn from")
+    parser.add_argument("--seed", metavar="N", type=whole_number, help="seed that the robots are drawn from")
     parser.add_argument("--surface", metavar="NAME", default="plane", help="ground to measure on (default: plane)")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="any parameter, as in 'run'; may be repeated"
@@ -166,11 +167,11 @@ def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
     """
     from robot_formation.experiment import scenario as scenarios
 
-    file = args.scenario
-    scenario = scenarios.load(file) if file is not None else scenarios.load_track(args.track or "two")
+    file, track = args.scenario, "two" if args.track is None else args.track
+    scenario = scenarios.load(file) if file is not None else scenarios.load_track(track)
     scenario = scenarios.with_surface(scenario, args.surface)
     if args.seed is not None:
-        scenario = scenarios.with_value(scenario, "seed", args.seed)
+        scenario = scenarios.with_option(scenario, "seed", args.seed, "--seed")
     scenario = scenarios.override(scenario, args.set)
     if not with_curves:
         for node in ("drive", "fine_tuner"):

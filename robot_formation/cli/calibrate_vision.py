@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.cli.parser import number, whole_number
 from robot_formation.cli.sweep import with_progress
 from robot_formation.errors import FormationError
 
@@ -35,9 +36,11 @@ _STEP_M = 0.05
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add what only this calibration has."""
     parser.add_argument(
-        "--step", metavar="M", type=float, default=_STEP_M, help=f"step of the grid, in metres (default: {_STEP_M})"
+        "--step", metavar="M", type=number, default=_STEP_M, help=f"step of the grid, in metres (default: {_STEP_M})"
     )
-    parser.add_argument("--jobs", metavar="N", type=int, default=os.cpu_count() or 1, help="looks at the same time")
+    parser.add_argument(
+        "--jobs", metavar="N", type=whole_number, default=os.cpu_count() or 1, help="looks at the same time"
+    )
 
 
 def run_vision(args: argparse.Namespace) -> int:

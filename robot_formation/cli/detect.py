@@ -48,6 +48,9 @@ def add_parser(subparsers: Any) -> None:
         help=f"with --sequence: microseconds between frames (default: {_FRAME_US})",
     )
     parser.add_argument("--draw", metavar="DIR", type=Path, help="write the images with their blocks into this folder")
+    parser.add_argument(
+        "--mask", metavar="FILE", type=Path, help="draw which pixels match which signature, of one image"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON and nothing else")
     parser.set_defaults(run=run)
 
@@ -62,9 +65,13 @@ def run(args: argparse.Namespace) -> int:
     import dataclasses
     import json
 
-    from robot_formation.vision.files import read_parameters, read_picture
+    from robot_formation.vision.files import check_readable, read_parameters, read_picture
     from robot_formation.vision.parameters import DetectorParameters
 
+    for path in args.images:
+        check_readable(path)
+    if args.mask is not None:
+        _check_mask(args)
     parameters = read_parameters(args.parameters, _warn) if args.parameters else DetectorParameters()
     if not args.sequence:
         parameters = dataclasses.replace(parameters, block_filtering=0)
@@ -74,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
     results = []
     for path, picture, blocks in frames:
         results.append({"image": str(path), "blocks": [dataclasses.asdict(block) for block in blocks]})
+        if args.mask is not None:
+            _mask(args, parameters, picture)
         if args.draw:
             _draw(args.draw, len(results), path, picture, blocks)
     print(json.dumps(results) if args.json else _table(results))
@@ -109,7 +118,7 @@ def _sequence(detector: BlockSensor, pictures: Iterable[tuple[Path, Picture]], d
 
 
 def _draw(folder: Path, number: int, path: Path, picture: Picture, blocks: list[Block]) -> None:
-    from robot_formation.vision.files import write_drawn
+    from robot_formation.vision.drawing import write_drawn
     from robot_formation.vision.picture import PictureError
 
     try:
@@ -117,6 +126,25 @@ def _draw(folder: Path, number: int, path: Path, picture: Picture, blocks: list[
     except OSError as error:
         raise PictureError(f"{folder}: can't be made ({error.strerror}); choose another folder") from error
     write_drawn(folder / f"{number:04d}_{path.stem}.png", picture, blocks)
+
+
+def _check_mask(args: argparse.Namespace) -> None:
+    if args.sensor == "tags":
+        raise FormationError("--mask shows what colours match; leave it out, or --sensor tags")
+    if len(args.images) != 1:
+        raise FormationError(f"--mask takes one image, not {len(args.images)}; give the images one by one")
+    if args.mask.suffix.lower() != ".png":
+        raise FormationError(f"--mask writes a PNG file; end the name '{args.mask}' with .png")
+
+
+def _mask(args: argparse.Namespace, parameters: DetectorParameters, picture: Picture) -> None:
+    from robot_formation.vision.color_table import ColorTable
+    from robot_formation.vision.drawing import write_mask
+    from robot_formation.vision.matches import matching_signatures
+    from robot_formation.vision.signatures import load_signatures
+
+    table = ColorTable.of(load_signatures(args.signatures), parameters)
+    write_mask(args.mask, picture, matching_signatures(picture, table))
 
 
 def _table(results: list[dict[str, Any]]) -> str:

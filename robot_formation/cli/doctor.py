@@ -16,6 +16,7 @@ from typing import Any
 
 import robot_formation
 from robot_formation import paths
+from robot_formation.shared_memory_space import SHARED_MEMORY, SharedMemoryError, require_space
 
 # Module to import, and the distributions (of pip) that may bring it.
 _MODULES = {
@@ -58,8 +59,9 @@ def run(args: argparse.Namespace) -> int:
             for name, value in values.items():
                 print(f"  {name:<24} {'-' if value is None else value}")
     if missing:
-        hint = "./formation in a checkout installs everything"
-        print(f"formation doctor: a run cannot start: {'; '.join(missing)} ({hint})", file=sys.stderr)
+        installs = any("installed" in text or "imported" in text for text in missing)
+        hint = " (./formation in a checkout installs everything)" if installs else ""
+        print(f"formation doctor: a run cannot start: {'; '.join(missing)}{hint}", file=sys.stderr)
         return 2
     return 0
 
@@ -123,9 +125,14 @@ def _ros(missing: list[str]) -> dict[str, Any]:
     )
     report: dict[str, Any] = {"wheels": ", ".join(wheels) or None}
     report.update({name: os.environ.get(name) for name in _VARIABLES})
+    report["rclpy"] = report["rmw"] = None
+    try:
+        require_space()  # loading ROS would end this process
+    except SharedMemoryError as error:
+        missing.append(str(error))
+        return report
     rclpy = _import("rclpy", missing)
     report["rclpy"] = getattr(rclpy, "__file__", None)
-    report["rmw"] = None
     if rclpy is not None:
         try:
             report["rmw"] = importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier()
@@ -157,7 +164,7 @@ def _domain(missing: list[str]) -> dict[str, Any]:
 
 
 def _shared_memory(missing: list[str]) -> dict[str, Any]:
-    from robot_formation.experiment.shared_memory import SHARED_MEMORY, fast_dds_files, find_orphans
+    from robot_formation.experiment.shared_memory import fast_dds_files, find_orphans
 
     try:
         state = os.statvfs(SHARED_MEMORY)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
+import textwrap
 from typing import Any
 
 
@@ -27,11 +29,18 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(found, indent=2))
         return 0
+    width = shutil.get_terminal_size().columns
     for kind, entries in found.items():
         print(kind)
         for name, text in entries.items():
-            print(f"  {name:<20} {text}")
+            print(_entry(name, text, width))
     return 0
+
+
+def _entry(name: str, text: str, width: int) -> str:
+    """Return a name and its description, wrapped at a terminal's width but never narrower than 40 characters."""
+    head = f"  {name:<20} "
+    return textwrap.fill(text, max(width, 40), initial_indent=head, subsequent_indent=" " * len(head))
 
 
 def collect() -> dict[str, dict[str, str]]:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import signal
 import sys
 from collections.abc import Sequence
-from typing import Any
 
 import robot_formation
 from robot_formation import exit_codes
@@ -29,6 +27,7 @@ from robot_formation.cli import (
     teach,
     test,
 )
+from robot_formation.cli.parser import Parser
 from robot_formation.errors import FormationError
 
 VERBS = (
@@ -43,7 +42,7 @@ exit codes: 0 done, 2 usage or bad input, 3 leader lost or plate left, 4 a node 
 
 def make_parser() -> argparse.ArgumentParser:
     """Build the parser of all verbs."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="formation",
         description="Robot formation on an unmapped curved surface, with Koopman prediction and a Pixy2 camera.",
         epilog=EPILOG,
@@ -59,8 +58,6 @@ def make_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a verb; return its exit code."""
     args = make_parser().parse_args(arguments)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _interrupt)
     try:
         code: int = args.run(args)
         sys.stdout.flush()
@@ -72,18 +69,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"formation {args.verb}: interrupted", file=sys.stderr)
         return exit_codes.INTERRUPTED
     except BrokenPipeError:
-        # The reader of our output (head, less) has gone; Python would complain once more at exit.
-        with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        forget_output()
         return exit_codes.DONE
     except OSError as error:
         print(f"formation {args.verb}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
         return exit_codes.BAD_INPUT
 
 
-def _interrupt(number: int, frame: Any) -> None:
-    raise KeyboardInterrupt
+def forget_output() -> None:
+    """Send the rest of standard output nowhere: its reader (head, less) has gone, and Python would complain at exit."""
+    with contextlib.suppress(OSError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    from robot_formation.cli.__main__ import main as process
+
+    raise SystemExit(process())

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.cli.parser import number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -26,9 +26,9 @@ def add_parser(subparsers: Any) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("play", help="publish the messages of a bag", description=DESCRIPTION)
     parser.add_argument("bag", metavar="BAG", type=Path, help="bag to play: a folder, an .mcap or a .db3 file")
-    parser.add_argument("-r", "--rate", metavar="X", type=_number, default=1.0, help="times real time (default: 1)")
-    parser.add_argument("--start", metavar="S", type=_number, default=0.0, help="seconds of the bag to leave out first")
-    parser.add_argument("--duration", metavar="S", type=_number, default=0.0, help="seconds of the bag to play")
+    parser.add_argument("-r", "--rate", metavar="X", type=number, default=1.0, help="times real time (default: 1)")
+    parser.add_argument("--start", metavar="S", type=number, default=0.0, help="seconds of the bag to leave out first")
+    parser.add_argument("--duration", metavar="S", type=number, default=0.0, help="seconds of the bag to play")
     parser.add_argument("-l", "--loop", action="store_true", help="begin again at the end, until Ctrl-C")
     parser.add_argument("--topics", metavar="TOPIC", nargs="+", default=[], help="play these topics only")
     parser.add_argument("-e", "--regex", metavar="R", default="", help="play topics that match as a whole")
@@ -39,14 +39,14 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--clock",
         metavar="HZ",
-        type=_number,
+        type=number,
         nargs="?",
         const=40.0,
         default=0.0,
         help="publish /clock (default: 40 Hz)",
     )
     parser.add_argument(
-        "--wait", metavar="S", type=_number, help="wait at most so long for a subscriber to every topic (default: 2)"
+        "--wait", metavar="S", type=number, help="wait at most so long for a subscriber to every topic (default: 2)"
     )
     parser.add_argument("--pause", action="store_true", help="begin in a pause")
     parser.add_argument("--json", action="store_true", help="print JSON and nothing else on standard output")
@@ -63,7 +63,9 @@ def run(args: argparse.Namespace) -> int:
         raise FormationError(f"--rate is {args.rate:g}, but must be above 0: 2 plays twice as fast, 0.5 at half speed")
     from robot_formation.bag.reader import read_bag
     from robot_formation.bag.selection import Selection
+    from robot_formation.shared_memory_space import require_space
 
+    require_space()  # before ROS is loaded
     selection = Selection(args.topics, args.regex, args.exclude)
     with read_bag(args.bag) as bag:
         if bag.recovered:
@@ -138,14 +140,3 @@ def _to_json(args: argparse.Namespace, report: PlayReport) -> dict[str, Any]:
 
 def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
-
-
-def _number(text: str) -> float:
-    """Convert for argparse, which turns the error into one line."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
-    return value

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import names
+from robot_formation.cli.parser import Names
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -36,12 +37,17 @@ def add_parser(subparsers: Any) -> None:
     source.add_argument("log", metavar="LOG.csv", type=Path, nargs="?", help="displacement log")
     source.add_argument("--bag", metavar="BAG", type=Path, help="take the log out of a recorded run instead")
     parser.add_argument("--robot", metavar="NAME", help=f"with --bag: whose log (default: {names.follower(1)})")
+    parser.add_argument(
+        "--namespace",
+        metavar="NS",
+        help="with --bag: the formation's namespace, where the bag holds several formations",
+    )
     parser.add_argument("--out", metavar="LOG.csv", type=Path, help="with --bag: write its log into this new file")
     parser.add_argument(
-        "--predictor",
-        metavar="NAME",
-        action="append",
-        default=[],
+        "--predictors",
+        metavar="NAME,...",
+        action=Names,
+        default=(),
         help="previous, measured, ewma+close, ...; may be repeated (default: all of 'formation list predictors')",
     )
     parser.add_argument(
@@ -77,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
     from robot_formation.analysis.forecasts import error_table, forecast_log
 
-    chosen = predictors(args.predictor, args.set)
+    chosen = predictors(args.predictors, args.set)
     log = read(args)
     forecasts = []
     for parameters in chosen:
@@ -108,13 +114,13 @@ def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[Predictor
 
     for name in chosen:
         if name not in NAMES:
-            raise FormationError(f"--predictor: no predictor '{name}'{suggestion(name, NAMES)}")
+            raise FormationError(f"--predictors: no predictor '{name}'{suggestion(name, NAMES)}")
     scenario = override(Scenario(Setup(), {}), settings)
     for setting in settings:
         if not setting.startswith("predictor."):
             raise FormationError(f"--set {setting}: a log has no scenario; set parameters like predictor.forgetting")
     if "name" in scenario.sections.get("predictor", {}):
-        raise FormationError("--set predictor.name: name predictors by --predictor NAME")
+        raise FormationError("--set predictor.name: name predictors by --predictors NAME,...")
     values = scenario.parameters("predictor")
     return [
         from_mapping(PredictorParameters, {**values, "name": name}, where="predictor")
@@ -131,14 +137,14 @@ def read(args: argparse.Namespace) -> DisplacementLog:
     from robot_formation.analysis.displacement_log import read_log, write_log
 
     if args.bag is None:
-        for option in ("robot", "out"):
+        for option in ("robot", "namespace", "out"):
             if getattr(args, option) is not None:
                 raise FormationError(f"--{option} belongs to --bag; leave it out, or give a bag instead of a log")
         return read_log(args.log)
     # Imported here, so that a log doesn't pay for rosbags.
     from robot_formation.analysis.from_bag import load_displacements
 
-    log = load_displacements(args.bag, args.robot or names.follower(1))
+    log = load_displacements(args.bag, args.robot or names.follower(1), args.namespace)
     if args.out is not None:
         write_log(log, args.out)
     return log
@@ -153,7 +159,7 @@ def _draw(args: argparse.Namespace, log: DisplacementLog, forecasts: Sequence[On
         path = _default_picture(args)
     from robot_formation.analysis.forecast_figures import MOST_DRAWN, draw_forecasts
 
-    wanted = args.predictor or _DRAWN
+    wanted = args.predictors or _DRAWN
     return draw_forecasts(log, [found for found in forecasts if found.name in wanted][:MOST_DRAWN], path)
 
 

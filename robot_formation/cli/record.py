@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
+    from robot_formation.bag.place import PathReservation
     from robot_formation.nodes.recording import RecorderParameters, RecordReport
 
 DESCRIPTION = """\
@@ -66,12 +67,13 @@ def run(args: argparse.Namespace) -> int:
         raise FormationError("say what to record: topics, --regex, or --all alone")
     from robot_formation.bag.place import PathReservation, check_free
     from robot_formation.bag.selection import Selection
+    from robot_formation.shared_memory_space import require_space
 
+    require_space()  # before ROS is loaded
     Selection(args.topics, args.regex, args.exclude or "")  # a bad expression is told before ROS is loaded
-    path = (args.out or default_bag()).absolute()
-    with PathReservation(path):
-        check_free(path)
-        report = _record(args, path)
+    with PathReservation(args.out) if args.out else default_bag() as place:
+        check_free(place.path)
+        report = _record(args, place.path)
     for text in _warnings(report):
         print(f"warning: {text}", file=sys.stderr)
     count = sum(report.message_counts.values())
@@ -82,11 +84,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def default_bag() -> Path:
-    """Name a new bag after the time."""
+def default_bag() -> PathReservation:
+    """Name a new bag after the time, and reserve the name."""
+    from robot_formation.bag.place import reserve_new
     from robot_formation.paths import default_bags_dir
 
-    return default_bags_dir() / time.strftime("recording_%Y%m%d-%H%M%S")
+    return reserve_new(default_bags_dir(), time.strftime("recording_%Y%m%d-%H%M%S"))
 
 
 def _record(args: argparse.Namespace, path: Path) -> RecordReport:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robot_formation.errors import FormationError
+from robot_formation.errors import FormationError, shown
 
 if TYPE_CHECKING:
     from robot_formation.experiment.recording import Recording
@@ -43,6 +43,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="a parameter of that node; may be repeated"
     )
+    parser.add_argument(
+        "--namespace", metavar="NS", help="the formation's namespace, where the bag holds several formations"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON and nothing else on standard output")
     parser.set_defaults(run=run)
 
@@ -61,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     if args.predictor is not None:
         changes["name"] = args.predictor
     with read_bag(args.bag) as bag:
-        recording = Recording(bag)
+        recording = Recording(bag, args.namespace)
         data, text = _REPLAYS[kind](recording, changes)
     for note in recording.notes:
         print(f"note: {note}", file=sys.stderr)
@@ -75,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _changes(kind: str, settings: Sequence[str]) -> dict[str, Any]:
     """Read --set as `formation run` does; settings of other nodes are refused."""
-    import yaml
+    from robot_formation.yaml_files import YamlError, parse_yaml
 
     found = {}
     for setting in settings:
@@ -86,9 +89,9 @@ def _changes(kind: str, settings: Sequence[str]) -> dict[str, Any]:
                 f"--set takes a parameter of the node that is replayed, {kind}.NAME=VALUE, not '{setting}'"
             )
         try:
-            found[name] = yaml.safe_load(text)
-        except yaml.YAMLError:
-            raise FormationError(f"--set {key}: '{text}' is no YAML value") from None
+            found[name] = parse_yaml(text)
+        except YamlError as error:
+            raise FormationError(f"--set {key}: {shown(text)} is no YAML value: {error.problem}") from None
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import sys
 import time
@@ -10,20 +11,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.cli.parser import number, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
+    from robot_formation.bag.place import PathReservation
     from robot_formation.experiment.run_result import RunResult
     from robot_formation.experiment.scenario import Scenario
 
 DESCRIPTION = """\
 Run a scenario through the node graph (one process per node), record it into a bag and analyse it. Without arguments:
-track two of the paper with the 'measured' predictor. Progress goes to standard error, the analysis to standard output.
+track two of the paper with the project's own predictor, 'formation' ('measured' is the paper's). Progress goes to
+standard error, the analysis to standard output.
 """
 
 
 MOST_WARNINGS = 20
-_TAILS = tuple(f"_{number}" for number in range(2, 1000))  # of bags begun in the same second
 
 
 def add_parser(subparsers: Any) -> None:
@@ -32,8 +35,12 @@ def add_parser(subparsers: Any) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--track", metavar="NAME", help="preset track: one, two (default), ... (see 'formation list')")
     what.add_argument("--scenario", metavar="FILE", type=Path, help="YAML file like those in config/scenarios")
-    parser.add_argument("--predictor", metavar="NAME", help="previous, literal, measured, ... (see 'formation list')")
-    parser.add_argument("--seed", metavar="N", type=int, help="seed of every random stream")
+    parser.add_argument(
+        "--predictor",
+        metavar="NAME",
+        help="formation (default), measured (the paper's), previous, ... (see 'formation list')",
+    )
+    parser.add_argument("--seed", metavar="N", type=whole_number, help="seed of every random stream")
     parser.add_argument("--surface", metavar="NAME", help="bowl, plane, ... (see 'formation list')")
     parser.add_argument(
         "--set",
@@ -45,7 +52,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--bag", metavar="PATH", type=Path, help="folder of the bag (default: a new one in bags/)")
     parser.add_argument("--images", action="store_true", help="record pictures too (126 MB per thousand)")
     parser.add_argument(
-        "--real-time-factor", metavar="X", type=float, help="0: as fast as possible (default), 1: real time"
+        "--real-time-factor", metavar="X", type=number, help="0: as fast as possible (default), 1: real time"
     )
     parser.add_argument(
         "--camera", metavar="MODE", help="stream (every frame, default) or on_demand (requested frames)"
@@ -68,8 +75,8 @@ def run(args: argparse.Namespace) -> int:
     tracing = TracingFiles()  # before anything of ROS is loaded
     try:
         scenario = build_scenario(args)
-        bag = args.bag.absolute() if args.bag is not None else default_bag(scenario)
-        result = execute(args, scenario, bag)
+        with reserve(args, scenario) as place:
+            result = execute(args, scenario, place)
     finally:
         tracing.remove_new()
     for warning in result.warnings[:MOST_WARNINGS]:
@@ -78,15 +85,23 @@ def run(args: argparse.Namespace) -> int:
         print(f"... and {len(result.warnings) - MOST_WARNINGS} more warnings", file=sys.stderr)
     if result.reason:
         print(f"formation run: {result.reason}", file=sys.stderr)
-    if result.bag is None:
-        return result.exit_code
     try:
-        report(args, result)
+        if result.bag is not None:
+            report(args, result)
+            sys.stdout.flush()
+            return result.exit_code
+    except BrokenPipeError:
+        from robot_formation.cli.main import forget_output
+
+        forget_output()
+        return result.exit_code
     except FormationError as error:
         if result.exit_code in (exit_codes.DONE, exit_codes.LOST):
             raise
         # A run that was cut short may have ended before there was anything to analyse.
         print(f"formation run: no analysis: {error}", file=sys.stderr)
+    if args.json:
+        print(cut_off_json(args, scenario, result))
     return result.exit_code
 
 
@@ -98,34 +113,36 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
     """
     from robot_formation.experiment import scenario as scenarios
 
-    file = args.scenario
-    scenario = scenarios.load(file) if file is not None else scenarios.load_track(args.track or "two")
+    file, track = args.scenario, "two" if args.track is None else args.track
+    scenario = scenarios.load(file) if file is not None else scenarios.load_track(track)
     if args.surface is not None:
         scenario = scenarios.with_surface(scenario, args.surface)
-    for key, value in (
-        ("predictor.name", args.predictor),
-        ("seed", args.seed),
-        ("world.camera.mode", args.camera),
-        ("world.real_time_factor", args.real_time_factor),
+    for option, key, value in (
+        ("--predictor", "predictor.name", args.predictor),
+        ("--seed", "seed", args.seed),
+        ("--camera", "world.camera.mode", args.camera),
+        ("--real-time-factor", "world.real_time_factor", args.real_time_factor),
     ):
         if value is not None:
-            scenario = scenarios.with_value(scenario, key, value)
+            scenario = scenarios.with_option(scenario, key, value, option)
     scenario = scenarios.override(scenario, args.set)
     scenario.check()
     return scenario
 
 
-def default_bag(scenario: Scenario) -> Path:
-    """Name a new bag after the run and the time."""
+def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
+    """Reserve the bag's path: as asked for, else a new name after the run and the time."""
+    from robot_formation.bag.place import PathReservation, reserve_new
     from robot_formation.paths import default_bags_dir
 
+    if args.bag is not None:
+        return PathReservation(args.bag)
     predictor = scenario.parameters("predictor")["name"]
     stem = f"{scenario.setup.name}_{predictor}_seed{scenario.setup.seed}_{time.strftime('%Y%m%d-%H%M%S')}"
-    folder, stem = default_bags_dir(), re.sub(r"[^\w.-]", "_", stem)
-    return next(path for path in (folder / f"{stem}{tail}" for tail in ("", *_TAILS)) if not path.exists())
+    return reserve_new(default_bags_dir(), re.sub(r"[^\w.-]", "_", stem))
 
 
-def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResult:
+def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation) -> RunResult:
     """Run the scenario in the way that the options ask for."""
     from robot_formation.experiment.camera_check import describe_camera
     from robot_formation.experiment.drive_check import describe_curves
@@ -142,14 +159,17 @@ def execute(args: argparse.Namespace, scenario: Scenario, bag: Path) -> RunResul
 
         if scenario.parameters("world")["real_time_factor"] > 0.0:
             raise FormationError("--in-process runs as fast as it can; leave --real-time-factor out")
-        return run_in_process(scenario, bag, run_metadata(scenario), images=args.images, say=say)
+        return run_in_process(
+            scenario, place.path, run_metadata(scenario), images=args.images, say=say, reservation=place
+        )
     from robot_formation.launching.launcher import Launcher
 
-    return Launcher(scenario, bag, images=args.images, say=say).run()
+    return Launcher(scenario, place.path, images=args.images, say=say, reservation=place).run()
 
 
 def report(args: argparse.Namespace, result: RunResult) -> None:
     """Print the analysis of the run's bag."""
+    from robot_formation.analysis.conditions import run_facts
     from robot_formation.analysis.from_bag import load_run
     from robot_formation.analysis.quantities import analyse
     from robot_formation.analysis.report import text_report, to_json, write_pictures
@@ -158,9 +178,36 @@ def report(args: argparse.Namespace, result: RunResult) -> None:
     record = load_run(result.bag)
     analysis = analyse(record)
     if args.json:
-        print(to_json(analysis))
+        print(to_json(analysis, {**run_facts(record.details, in_process=args.in_process), **_ending(result)}))
         return
     print(text_report(record, analysis))
+    if result.exit_code == exit_codes.INTERRUPTED:  # whoever interrupts wants to leave
+        print(f"\nbag: {result.bag}\n'formation analyze {result.bag}' makes the pictures")
+        return
     folder = result.bag.with_name(f"{result.bag.name}_analysis")
     pictures = write_pictures(record, analysis, folder)
     print(f"\nbag: {result.bag}\npictures: " + ", ".join(str(picture) for picture in pictures))
+
+
+def cut_off_json(args: argparse.Namespace, scenario: Scenario, result: RunResult) -> str:
+    """Return the JSON of a run that left nothing to analyse: what it was to be, and why it ended."""
+    from robot_formation.analysis.conditions import run_facts
+    from robot_formation.launching.processes import run_metadata
+
+    facts = run_facts(run_metadata(scenario), in_process=args.in_process)
+    nothing: dict[str, Any] = {
+        "scenario": scenario.setup.name,
+        "outcome": "incomplete",
+        "timesteps": [],
+        "totals": None,
+    }
+    return json.dumps({**nothing, **facts, **_ending(result)}, indent=2)
+
+
+def _ending(result: RunResult) -> dict[str, Any]:
+    """List what a run's JSON says of its files, and why it ended before its end."""
+    return {
+        "bag": None if result.bag is None else str(result.bag),
+        "pictures": [],
+        "reason": result.reason or None,
+    }

@@ -8,12 +8,17 @@ import os
 import re
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.cli.parser import Names, whole_number
 from robot_formation.errors import FormationError
+
+if TYPE_CHECKING:
+    from robot_formation.bag.place import PathReservation
+    from robot_formation.experiment.sweep import Plan
 
 DESCRIPTION = """\
 Run every combination of tracks, surfaces, predictors and seeds in process (camera on demand; fine-tuner in mode
@@ -24,21 +29,31 @@ controller, commanded the ideal move.
 """
 SUMMARY_NAME = "summary.json"
 TABLE_NAME = "summary.md"
+FEW_SEEDS = 5
+"""Of n seeds, the whole range of values covers the median with a probability of 1 - 2**(1 - n): 94 % for five."""
+MOST_SEEDS = 1_000_000
 
 
 def add_parser(subparsers: Any) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("sweep", help="compare predictors over many runs", description=DESCRIPTION)
-    parser.add_argument("--tracks", metavar="NAME,...", default="one,two", help="preset tracks (default: one,two)")
-    parser.add_argument("--surfaces", metavar="NAME,...", default="bowl", help="surfaces (default: bowl)")
+    for name, default, what in (
+        ("tracks", ("one", "two"), "preset tracks"),
+        ("surfaces", ("bowl",), "surfaces"),
+        ("predictors", ("previous", "measured", "formation"), "predictors"),
+    ):
+        told = f"{what}; may be repeated (default: {','.join(default)})"
+        parser.add_argument(f"--{name}", metavar="NAME,...", action=Names, default=default, help=told)
     parser.add_argument(
-        "--predictors",
-        metavar="NAME,...",
-        default="previous,measured,formation",
-        help="predictors (default: previous,measured,formation)",
+        "--seeds",
+        metavar="FIRST:END,...",
+        action=Names,
+        default=("0:20",),
+        help="seeds FIRST to END - 1, or single ones: 7 is the one seed 7; may be repeated (default: 0:20)",
     )
-    parser.add_argument("--seeds", metavar="FIRST:END", default="0:20", help="seeds FIRST to END - 1 (default: 0:20)")
-    parser.add_argument("--jobs", metavar="N", type=int, default=os.cpu_count() or 1, help="runs at the same time")
+    parser.add_argument(
+        "--jobs", metavar="N", type=whole_number, default=os.cpu_count() or 1, help="runs at the same time"
+    )
     parser.add_argument("--dask", metavar="SCHEDULER", help="address of a Dask scheduler, instead of --jobs")
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the results (default: a new one in bags/)")
     parser.add_argument(
@@ -54,17 +69,24 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments or the folder, before anything is run.
     """
-    from robot_formation.analysis.sweep_summary import summarise, table
     from robot_formation.experiment import sweep
 
-    plan = sweep.Plan(
-        _names(args.tracks), _names(args.surfaces), _names(args.predictors), seeds(args.seeds), tuple(args.set)
-    )
+    plan = sweep.Plan(args.tracks, args.surfaces, args.predictors, seeds(",".join(args.seeds)), tuple(args.set))
     if args.jobs < 1:
         raise FormationError(f"--jobs is at least 1, not {args.jobs}")
     plan.check()
-    folder = args.out if args.out is not None else default_folder()
+    if args.out is not None:
+        return _sweep(args, plan, args.out)
+    with default_folder() as place:
+        return _sweep(args, plan, place.path)
+
+
+def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
+    from robot_formation.analysis.sweep_summary import summarise, table
+    from robot_formation.experiment import sweep
+
     results = sweep.Table(folder, plan)
+    _announce(plan)
     tasks = sweep.remaining(plan, results.rows)
     done = len(results.rows)
     if tasks:
@@ -82,45 +104,97 @@ def run(args: argparse.Namespace) -> int:
             print(f"\nformation sweep: interrupted; the same command with --out {folder} goes on", file=sys.stderr)
             return exit_codes.INTERRUPTED
     summary = summarise(sweep.chosen(plan, results.rows))
-    (folder / SUMMARY_NAME).write_text(json.dumps({"summary": summary}, indent=2) + "\n", encoding="utf-8")
-    (folder / TABLE_NAME).write_text(table(summary) + "\n", encoding="utf-8")
+    said = {"summary": summary, **_facts(plan)}
+    shown = f"{table(summary)}\n\n{_conditions_text(plan)}"
+    (folder / SUMMARY_NAME).write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
+    (folder / TABLE_NAME).write_text(shown + "\n", encoding="utf-8")
     if args.json:
-        print(json.dumps({"runs": str(folder / sweep.RUNS_NAME), "summary": summary}, indent=2))
+        files: dict[str, Any] = {
+            "bag": None,
+            "pictures": [],
+            "reason": None,
+        }  # no run is recorded or drawn; all came to an end
+        print(json.dumps({"runs": str(folder / sweep.RUNS_NAME), **said, **files}, indent=2))
     else:
-        print(table(summary))
+        print(shown)
         print(f"\nruns: {folder / sweep.RUNS_NAME}\nsummary: {folder / SUMMARY_NAME}")
     return exit_codes.DONE
 
 
+def _facts(plan: Plan) -> dict[str, Any]:
+    """List what was run, for the JSON."""
+    return {
+        "tracks": list(plan.tracks),
+        "surfaces": list(plan.surfaces),
+        "predictors": list(plan.predictors),
+        "seeds": list(plan.seeds),
+        "settings": list(plan.settings),
+        "conditions": plan.conditions(),
+    }
+
+
+def _conditions_text(plan: Plan) -> str:
+    """Say under what conditions all runs were made: others give other figures."""
+    from robot_formation.analysis.conditions import conditions_text
+
+    settings = f"; {', '.join(plan.settings)}" if plan.settings else ""
+    return f"Conditions: {conditions_text(plan.conditions())}, in one process; {seeds_text(plan.seeds)}{settings}"
+
+
+def _announce(plan: Plan) -> None:
+    """Tell standard error which seeds are run, and if they are too few."""
+    print(seeds_text(plan.seeds), file=sys.stderr)
+    if len(plan.seeds) < FEW_SEEDS:
+        text = f"warning: intervals say nothing with fewer than {FEW_SEEDS} seeds; 20 are --seeds 0:20"
+        print(text, file=sys.stderr)
+
+
+def seeds_text(chosen: Sequence[int]) -> str:
+    """Say seeds in words: '1 seed: 5', 'seeds 0 to 4 (5 seeds)', 'seeds 0 to 2, 7 (4 seeds)'."""
+    if len(chosen) == 1:
+        return f"1 seed: {chosen[0]}"
+    ranges: list[list[int]] = []
+    for seed in sorted(chosen):
+        if ranges and seed == ranges[-1][-1] + 1:
+            ranges[-1][1:] = [seed]
+        else:
+            ranges.append([seed])
+    said = [" to ".join(map(str, ends)) for ends in ranges]
+    shown = said if len(said) <= 10 else [*said[:9], f"... {said[-1]}"]
+    return f"seeds {', '.join(shown)} ({len(chosen)} seeds)"
+
+
 def seeds(text: str) -> tuple[int, ...]:
-    """Read FIRST:END, or one seed.
+    """Read FIRST:END, single seeds, or several of these separated by commas; each seed counts once.
 
     Raises:
         FormationError: on anything else, or an empty range.
     """
+    found = tuple(dict.fromkeys(seed for part in text.split(",") for seed in _seeds(part)))
+    if len(found) > MOST_SEEDS:
+        raise FormationError(f"--seeds {text} are more than a million")
+    return found
+
+
+def _seeds(text: str) -> range:
     match = re.fullmatch(r"(\d{1,18})(?::(\d{1,18}))?", text)
     if match is None:
-        raise FormationError(f"--seeds takes FIRST:END, like 0:200, not '{text}'")
+        raise FormationError(f"--seeds takes FIRST:END, like 0:200, or single seeds, like 7,8, not '{text[:60]}'")
     first = int(match[1])
     end = int(match[2]) if match[2] else first + 1
     if end <= first:
         raise FormationError(f"--seeds {text} holds no seed: END is not among them")
-    if end - first > 1_000_000:
+    if end - first > MOST_SEEDS:
         raise FormationError(f"--seeds {text} are more than a million")
-    return tuple(range(first, end))
+    return range(first, end)
 
 
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(",") if name.strip())
-
-
-def default_folder() -> Path:
-    """Name a new folder after the time."""
+def default_folder() -> PathReservation:
+    """Name a new folder after the time, and reserve the name."""
+    from robot_formation.bag.place import reserve_new
     from robot_formation.paths import default_bags_dir
 
-    stem = f"sweep_{time.strftime('%Y%m%d-%H%M%S')}"
-    tails = ("", *(f"_{number}" for number in range(2, 1000)))
-    return next(path for path in (default_bags_dir() / f"{stem}{tail}" for tail in tails) if not path.exists())
+    return reserve_new(default_bags_dir(), f"sweep_{time.strftime('%Y%m%d-%H%M%S')}")
 
 
 def with_progress(rows: Iterable[Any], count: int, what: str = "runs") -> Iterator[Any]:

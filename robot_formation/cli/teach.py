@@ -7,10 +7,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from robot_formation.cli.parser import whole_number
+
 DESCRIPTION = """\
 Teach a colour signature from an image: from a rectangle, as "Set signature" does in PixyMon, or growing from a point,
 as the camera's button does from the picture's centre (158,104). Pixels of the 316 x 208 picture. With --out, an
-existing file keeps its other signatures.
+existing file keeps its other signatures. A signature that is grey, too narrow or too wide, overlaps another one of that
+file or matches most of the picture is warned of; 'formation detect --mask FILE' shows which pixels match.
 """
 
 
@@ -22,7 +25,12 @@ def add_parser(subparsers: Any) -> None:
     place.add_argument("--region", metavar="X,Y,W,H", type=_numbers(4), help="rectangle to teach")
     place.add_argument("--point", metavar="X,Y", type=_numbers(2), help="point to grow from")
     parser.add_argument(
-        "--signature", metavar="N", type=int, choices=range(1, 8), default=1, help="number, 1 to 7 (default: 1)"
+        "--signature",
+        metavar="N",
+        type=whole_number,
+        choices=range(1, 8),
+        default=1,
+        help="number, 1 to 7 (default: 1)",
     )
     parser.add_argument(
         "--parameters", metavar="FILE", type=Path, help="parameters by our names or PixyMon's, YAML or JSON"
@@ -39,10 +47,12 @@ def run(args: argparse.Namespace) -> int:
         FormationError: the image, the place, the parameters or the file of signatures can't be used.
     """
     # Imported here, so that the other verbs don't pay for OpenCV.
+    import dataclasses
     import json
 
     from robot_formation.vision.files import read_parameters, read_picture
     from robot_formation.vision.parameters import DetectorParameters
+    from robot_formation.vision.signature_quality import shortcomings
     from robot_formation.vision.signatures import load_signatures, save_signatures, teach_point, teach_region
 
     parameters = read_parameters(args.parameters, _warn) if args.parameters else DetectorParameters()
@@ -52,10 +62,14 @@ def run(args: argparse.Namespace) -> int:
         signature = teach_region(picture, args.region, args.signature)
     else:
         signature, _ = teach_point(picture, args.point, parameters.signature_teach_threshold, args.signature)
+    found = shortcomings(signature, kept, picture, parameters)
+    for shortcoming in found:
+        _warn(f"warning: signature {signature.sig}: {shortcoming.text}")
     if args.out:
         save_signatures(args.out, [*(other for other in kept if other.sig != signature.sig), signature])
     if args.json:
-        print(json.dumps({"signatures": [signature.to_mapping()]}))
+        warnings = [dataclasses.asdict(shortcoming) for shortcoming in found]
+        print(json.dumps({"signatures": [signature.to_mapping()], "warnings": warnings}))
         return 0
     print(
         f"signature {signature.sig}: u {signature.u_min} to {signature.u_max}, v {signature.v_min} to "

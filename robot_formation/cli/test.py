@@ -9,13 +9,14 @@ import argparse
 import os
 import sys
 
+from robot_formation.cli.parser import Parser
 from robot_formation.errors import FormationError
 from robot_formation.paths import project_root
 
 _MOST_WORKERS = 4  # the tests of the node graph start a dozen processes each
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: argparse._SubParsersAction[Parser]) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser(
         "test",
@@ -24,6 +25,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "instead, for instance: formation test -- -k predictor -x",
     )
     parser.add_argument("pytest_arguments", nargs="*", metavar="PYTEST_ARGUMENT", help="after --: handed to pytest")
+    parser.unknown_hint = "; arguments of pytest come after --, like: formation test -- -k predictor"
     parser.set_defaults(run=run)
 
 

@@ -103,10 +103,12 @@ class BlockDetectorComponent(Component):
     def details(self) -> dict[str, str]:
         """See `Component`."""
         periods = [later - earlier for earlier, later in itertools.pairwise(self._stamps)]
+        # A sensor that was changed meanwhile takes a stamp once more: the period is 0 then.
+        period_ns = statistics.median(periods) if periods else 0
         return {
             "frames": str(self._frames),
             "dropped": str(self._dropped),
-            "frame_rate_hz": f"{1e9 / statistics.median(periods):.1f}" if periods else "",
+            "frame_rate_hz": f"{1e9 / period_ns:.1f}" if period_ns > 0 else "",
             "processing_mean_ms": f"{1e3 * self._total_s / self._timed:.3f}" if self._timed else "",
             "processing_worst_ms": f"{1e3 * self._worst_s:.3f}" if self._timed else "",
         }

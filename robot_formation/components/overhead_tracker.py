@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.components.trail import Trail
 from robot_formation.parameters import ParameterError, parameter
-from robot_formation.surface import Surface, surface_from_texts
+from robot_formation.surface import SURFACES, Surface, surface_from_texts
 from robot_formation.vision.overhead_tracking import OverheadTracker, OverheadTrackingParameters
 
 
@@ -24,7 +25,9 @@ class OverheadTrackerNodeParameters(OverheadTrackingParameters):
     start_y_m: tuple[float, ...] = parameter(
         (0.16, 0.16), "Start of each robot's base_link in the world", unit="m", low=-10.0, high=100.0
     )
-    surface: str = parameter("bowl", "Name of the surface that a calibration with knows_surface means")
+    surface: str = parameter(
+        "bowl", "Name of the surface that a calibration with knows_surface means", known=tuple(SURFACES)
+    )
     surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
 
     def __post_init__(self) -> None:
@@ -43,7 +46,7 @@ class OverheadTrackerNodeParameters(OverheadTrackingParameters):
 
 
 class OverheadTrackerComponent(Component):
-    """Answers each picture with the places of all robots' dots, and with the paths of those that were seen."""
+    """Answers each picture with the places of all robots' dots, and with their paths as far as seen."""
 
     fixed: ClassVar[Mapping[str, str]] = {"robots": "it decides on topics; start another tracker"}
 
@@ -51,7 +54,7 @@ class OverheadTrackerComponent(Component):
         super().__init__(place)
         self._tracker = OverheadTracker(parameters, parameters.make_surface(), parameters.starts())
         self._path_topics = {robot: names.overhead_path(robot) for robot in parameters.robots}
-        self._paths: dict[str, list[Any]] = {robot: [] for robot in parameters.robots}
+        self._trails: dict[str, Trail[Any]] = {robot: Trail() for robot in parameters.robots}
         self._pictures = 0
         self._unseen: list[str] = []
 
@@ -89,8 +92,8 @@ class OverheadTrackerComponent(Component):
         self._pictures += 1
         found = self._tracker.update(picture)
         if earlier or self._tracker.restarted:
-            self._paths = {robot: [] for robot in self._paths}
-        self._unseen = [robot for robot in self._paths if robot not in found]
+            self._trails = {robot: Trail() for robot in self._trails}
+        self._unseen = [robot for robot in self._trails if robot not in found]
         frame = names.WORLD_FRAME
         poses = {
             robot: conversions.place(track.place.tolist(), frame, stamp_ns)
@@ -98,5 +101,6 @@ class OverheadTrackerComponent(Component):
         }
         self._send(names.OVERHEAD_POSES, conversions.pose_array(list(poses.values()), frame, stamp_ns))
         for robot in found:
-            self._paths[robot].append(poses[robot])
-            self._send(self._path_topics[robot], conversions.path(self._paths[robot], frame, stamp_ns))
+            path = self._trails[robot].add(self._tracker.tracks[robot].place.tolist(), poses[robot])
+            if path is not None:
+                self._send(self._path_topics[robot], conversions.path(path, frame, stamp_ns))

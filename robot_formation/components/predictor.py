@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import numpy as np
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.files import MOST_RECORD_BYTES, read_file
 from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
 
+_MOST_UNPAIRED = 16  # timesteps of which not all parts have come: in a run, one at a time
 # (u, v) to (x, y) = (v, -u): how a covariance of the paper's axes becomes one of REP-103.
 _TO_XY = np.array([[0.0, 1.0], [-1.0, 0.0]])
 
@@ -25,9 +28,8 @@ class PredictorComponent(Component):
         state_file = parameters.state_file.replace("{robot}", place.robot)
         self._state_file = Path(state_file) if state_file else None
         self._predictor = self._restored(parameters)
-        self._displacements: dict[int, Any] = {}
-        self._residuals: dict[int, Any] = {}
-        self._commanded: dict[int, Any] = {}
+        # By stamp, then topic: (u, v) [m], None where there is no estimate.
+        self._parts: dict[int, dict[names.Topic, Any]] = {}
         self._first_commanded_ns: int | None = None
 
     def _restored(self, parameters: PredictorParameters) -> Predictor:
@@ -39,8 +41,8 @@ class PredictorComponent(Component):
         if not self._state_file.exists():
             return Predictor(parameters)
         try:
-            state = json.loads(self._state_file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+            state = json.loads(read_file(self._state_file, MOST_RECORD_BYTES))
+        except (OSError, ValueError, RecursionError) as error:
             raise PredictionError(f"{self._state_file}: can't read the predictor's state: {error}") from None
         try:
             return Predictor.from_state(parameters, state)
@@ -61,9 +63,8 @@ class PredictorComponent(Component):
     def inputs(self) -> list[Input]:
         """See `Component`."""
         return [
-            Input(names.COMMANDED, self._on_commanded),
-            Input(names.DISPLACEMENT, self._on_displacement),
-            Input(names.RESIDUAL, self._on_residual),
+            Input(topic, partial(self._on_part, topic))
+            for topic in (names.COMMANDED, names.DISPLACEMENT, names.RESIDUAL)
         ]
 
     def outputs(self) -> list[names.Topic]:
@@ -94,20 +95,29 @@ class PredictorComponent(Component):
         u_m, v_m = (forecast.mean - forecast.command).tolist()
         return (u_m, v_m)
 
-    def _on_displacement(self, message: Any) -> None:
-        self._displacements[conversions.stamp_of(message)] = message
-        self._answer(conversions.stamp_of(message))
-
-    def _on_residual(self, message: Any) -> None:
-        self._residuals[conversions.stamp_of(message)] = message
-        self._answer(conversions.stamp_of(message))
-
-    def _on_commanded(self, message: Any) -> None:
+    def _on_part(self, topic: names.Topic, message: Any) -> None:
         stamp_ns = conversions.stamp_of(message)
-        if self._first_commanded_ns is None:
+        if topic == names.COMMANDED and self._first_commanded_ns is None:
             self._first_commanded_ns = stamp_ns
-        self._commanded[stamp_ns] = message
+        self._parts.setdefault(stamp_ns, {})[topic] = self._read(topic, message)
+        while len(self._parts) > _MOST_UNPAIRED:
+            oldest_ns = next(iter(self._parts))
+            there = " and ".join(found.name for found in self._parts.pop(oldest_ns))
+            self.warn(f"{there} of {oldest_ns} ns came without the rest of the timestep and is forgotten")
         self._answer(stamp_ns)
+
+    def _read(self, topic: names.Topic, message: Any) -> Any:
+        """Read (u, v) [m] of a displacement, None where there is no estimate."""
+        if not conversions.has_estimate(message):
+            if topic == names.DISPLACEMENT:
+                self.warn("a displacement without an estimate is left out")
+            return None
+        motion = conversions.read_displacement(message)
+        found = np.array([motion.u_m, motion.v_m])
+        if not np.isfinite(found).all():
+            self.warn(f"{topic.name}: ({motion.u_m}, {motion.v_m}) m is not finite; it is left out")
+            return None
+        return found
 
     def _answer(self, stamp_ns: int) -> None:
         """Predict once all parts of the timestep are here, in whatever order they came.
@@ -115,20 +125,19 @@ class PredictorComponent(Component):
         `commanded` is waited for only after it has been heard of in an earlier timestep: whoever sends none gets
         answers too, and what is heard doesn't depend on the order in which topics arrive.
         """
-        if stamp_ns not in self._displacements or stamp_ns not in self._residuals:
+        parts = self._parts.get(stamp_ns, {})
+        if names.DISPLACEMENT not in parts or names.RESIDUAL not in parts:
             return
         expected = self._first_commanded_ns is not None and self._first_commanded_ns < stamp_ns
-        if expected and stamp_ns not in self._commanded:
+        if expected and names.COMMANDED not in parts:
             return
         self.stamp_ns = stamp_ns
-        displacement = _uv(self._displacements.pop(stamp_ns))
-        residual = _uv(self._residuals.pop(stamp_ns))
-        commanded = _uv(self._commanded.pop(stamp_ns)) if expected else None
-        if displacement is None:
-            self.warn("a displacement without an estimate is left out")
-        else:
+        del self._parts[stamp_ns]
+        displacement = parts[names.DISPLACEMENT]
+        if displacement is not None:
+            commanded = parts[names.COMMANDED] if expected else None
             try:
-                self._predictor.observe(displacement, residual, commanded)
+                self._predictor.observe(displacement, parts[names.RESIDUAL], commanded)
             except PredictionError as error:
                 self.warn(str(error))
         try:
@@ -145,11 +154,3 @@ class PredictorComponent(Component):
     def _send_prediction(self, mean: Motion, covariance: Any) -> None:
         base = self.place.frame(names.BASE_FRAME)
         self._send(names.PREDICTION, conversions.displacement(mean, base, self.stamp_ns, covariance))
-
-
-def _uv(message: Any) -> Any:
-    """Read (u, v) [m] of a displacement, None where there is no estimate."""
-    if not conversions.has_estimate(message):
-        return None
-    motion = conversions.read_displacement(message)
-    return np.array(motion.uv_m)

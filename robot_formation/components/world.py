@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.overhead_view import OverheadView
+from robot_formation.components.trail import Trail
 from robot_formation.errors import FormationError
 from robot_formation.parameters import ParameterError, parameter
-from robot_formation.surface import Surface, surface_from_texts
+from robot_formation.surface import SURFACES, Surface, surface_from_texts
 from robot_formation.world.checks import check_setup
 from robot_formation.world.description import robot_description
 from robot_formation.world.events import Event, Frame, JointStates, LeftPlate, RobotPose
@@ -31,7 +32,7 @@ class WorldNodeParameters(WorldParameters):
     """The world's parameters, its surface, its robots and where they start."""
 
     seed: int = parameter(0, "Seed of every random stream", low=0, high=2**63 - 1)
-    surface: str = parameter("bowl", "Name of the surface")
+    surface: str = parameter("bowl", "Name of the surface", known=tuple(SURFACES))
     surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
     robots: tuple[str, ...] = parameter(("leader", "follower_1"), "Names of the robots; followers carry a camera")
     start_x_m: tuple[float, ...] = parameter((0.76, 1.08), "Start of each robot's base_link in the world", unit="m")
@@ -97,7 +98,7 @@ class WorldComponent(Component):
         self._parameters = parameters
         self._moving: set[str] = set()
         self._numbers = dict.fromkeys(parameters.robots, "")  # of each robot's last command, echoed to its drive
-        self._paths: dict[str, list[Any]] = {name: [] for name in parameters.robots}
+        self._trails: dict[str, Trail[Any]] = {name: Trail() for name in parameters.robots}
         self._overhead = OverheadView(surface, parameters, parameters.seed)
         self.stamp_ns = start_ns
 
@@ -193,6 +194,7 @@ class WorldComponent(Component):
     def _on_reset(self) -> tuple[bool, str]:
         """Start again with the parameters set before; stamps go on at the next whole second."""
         old = self._world
+        used = any(self._numbers.values()) or bool(self._moving)
         try:
             self._set_up(self._next, (old.stamp_ns // 10**9 + 1) * 10**9)
         except FormationError as error:
@@ -201,7 +203,10 @@ class WorldComponent(Component):
         self.start()
         for name in self._parameters.robots:
             self._publish(self._world.joint_states(name))
-        return True, f"seed {self._parameters.seed}, from {self.stamp_ns / 1e9:g} s on"
+        text = f"seed {self._parameters.seed}, from {self.stamp_ns / 1e9:g} s on"
+        if used:
+            text += "; a run that was under way waits for ever: start its leader, fine-tuners and predictors again"
+        return True, text
 
     def _on_pause(self, paused: bool) -> tuple[bool, str]:
         self._paused = paused
@@ -276,10 +281,11 @@ class WorldComponent(Component):
         self._send(self._odom[robot], odometry)
         if event.final:
             pose = conversions.pose_of(odometry)
-            self._paths[robot].append(pose)
             self._send(names.ground_truth_pose(robot), pose)
-            path = conversions.path(self._paths[robot], names.WORLD_FRAME, event.stamp_ns)
-            self._send(names.ground_truth_path(robot), path)
+            path = self._trails[robot].add(state.pose.position, pose)
+            if path is not None:
+                message = conversions.path(path, names.WORLD_FRAME, event.stamp_ns)
+                self._send(names.ground_truth_path(robot), message)
 
 
 def surface_mesh(surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:

@@ -15,8 +15,9 @@ from typing import Any
 import yaml
 
 from robot_formation.control.drive import DriveParameters
-from robot_formation.errors import FormationError
+from robot_formation.errors import FormationError, shown
 from robot_formation.parameters import suggestion
+from robot_formation.yaml_files import read_yaml
 
 Curve = tuple[float, ...]
 
@@ -100,18 +101,13 @@ def read_sections(path: str | Path, section: str, *, what: str, verb: str) -> tu
     Raises:
         CalibrationError: if it can't be read or holds no such calibration.
     """
-    try:
-        content = yaml.safe_load(Path(path).read_bytes())
-    except OSError as error:
-        raise CalibrationError(f"{path}: can't be read ({error.strerror}); measure one with '{verb}'") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise CalibrationError(f"{path}: is no YAML ({' '.join(str(error).split())[:120]})") from error
+    content = read_yaml(path, refuse=CalibrationError, remedy=f"measure one with '{verb}'")
     found = content.get(section) if isinstance(content, Mapping) else None
     if not isinstance(found, Mapping) or not found:
         raise CalibrationError(f"{path}: holds no {what} (a mapping '{section}'); measure one with '{verb}'")
     facts = content.get("measured_with") or {}
     if not isinstance(facts, Mapping):
-        raise CalibrationError(f"{path}: 'measured_with' must hold names and values, not {facts!r}")
+        raise CalibrationError(f"{path}: 'measured_with' must hold names and values, not {shown(facts)}")
     return found, {str(name): value for name, value in facts.items()}
 
 
@@ -145,7 +141,7 @@ def save_calibration(path: str | Path, calibration: MotorCalibration) -> None:
 
 def _curves(curves: Any, where: str) -> dict[str, Curve]:
     if not isinstance(curves, Mapping) or not curves:
-        raise CalibrationError(f"{where}: needs curves by axis ({', '.join(AXES)}), not {curves!r}")
+        raise CalibrationError(f"{where}: needs curves by axis ({', '.join(AXES)}), not {shown(curves)}")
     for axis in curves:
         if axis not in AXES:
             raise CalibrationError(f"{where}: no axis '{axis}'{suggestion(str(axis), AXES)}")
@@ -159,7 +155,7 @@ def _curve(values: Any, where: str) -> Curve:
     if not numbers or not 2 <= len(values) <= _MAX_COEFFICIENTS:
         raise CalibrationError(
             f"{where}: a curve is a list of 2 to {_MAX_COEFFICIENTS} finite numbers, constant term first, "
-            f"not {values!r}"
+            f"not {shown(values)}"
         )
     return tuple(float(value) for value in values)
 

@@ -5,7 +5,11 @@ Readers check what comes from outside and raise `MessageError` before anything r
 
 from __future__ import annotations
 
-from robot_formation.conversions.basics import (
+from robot_formation.shared_memory_space import require_space
+
+require_space()  # before the imports below load ROS
+
+from robot_formation.conversions.basics import (  # noqa: E402
     MessageError,
     clock,
     diagnostics,
@@ -19,10 +23,10 @@ from robot_formation.conversions.basics import (
     to_time,
     uint32,
 )
-from robot_formation.conversions.markers import (
+from robot_formation.conversions.markers import (  # noqa: E402
     surface_marker,
 )
-from robot_formation.conversions.motion import (
+from robot_formation.conversions.motion import (  # noqa: E402
     NO_ESTIMATE,
     body_odometry,
     displacement,
@@ -41,7 +45,7 @@ from robot_formation.conversions.motion import (
     read_move,
     read_pose,
 )
-from robot_formation.conversions.vision import (
+from robot_formation.conversions.vision import (  # noqa: E402
     BLOCK_DTYPE,
     blocks,
     camera_info,

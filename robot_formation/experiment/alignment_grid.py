@@ -27,6 +27,7 @@ from robot_formation.experiment.alignment_trial import (
     gap_m,
     poses,
 )
+from robot_formation.files import check_file
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.detector import BlockDetector
 from robot_formation.world.events import Frame
@@ -186,6 +187,7 @@ def read_rows(path: Path) -> list[Row]:
         FormationError: if the file is no such table.
     """
     kinds = {field.name: {"int": int, "float": float}.get(str(field.type), str) for field in fields(Row)}
+    check_file(path)
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.reader(line for line in file if line.endswith("\n"))
         if next(reader, None) != list(kinds):

@@ -17,6 +17,7 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.camera_samples import CameraSample
 from robot_formation.experiment.alignment_trial import FOLLOWER
+from robot_formation.experiment.pool import run_parallel
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.experiment.vision_grid import Conditions, Position, measure, stand
 from robot_formation.parameters import from_mapping
@@ -59,16 +60,13 @@ _RELEVANT = {
 
 
 def carry_out(positions: Iterable[Position], conditions: Conditions, jobs: int) -> Iterator[list[CameraSample]]:
-    """Look at all positions, on several cores by joblib; yields each position's samples as they come.
+    """Look at all positions, on several cores by joblib; yields each position's samples, in order.
 
     Raises:
         CalibrationError: if a worker process dies.
     """
-    from joblib import Parallel, delayed
-
-    pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="3*n_jobs")
     try:
-        yield from pool(delayed(measure)(position, conditions) for position in positions)
+        yield from run_parallel(measure, ((position, conditions) for position in positions), jobs)
     except BrokenExecutor:
         raise CalibrationError(
             f"a worker process died (too little memory for --jobs {jobs}?); the same command goes on"
@@ -130,7 +128,7 @@ def _odometry(pose: Pose, robot: str, stamp_ns: int) -> Any:
 
 
 def _record(recorder: Recorder, namespace: str, topic: names.Topic, message: Any) -> None:
-    name = f"/{names.under(namespace, topic.name)}"
+    name = names.absolute(f"/{namespace}", topic.name)
     if name not in recorder.topics:
         q = topic.qos
         recorder.add_topic(name, topic.type, TopicQos(q.history, q.depth, q.reliability, q.durability))

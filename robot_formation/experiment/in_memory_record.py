@@ -31,10 +31,11 @@ def run_in_memory(
     messages: dict[str, list[Any]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
     now_ns = 0
+    clock = names.absolute("", names.CLOCK_TOPIC.name)
 
     def listen(topic: str, message: Any) -> None:
         nonlocal now_ns
-        if topic == names.CLOCK_TOPIC.name:
+        if topic == clock:
             now_ns = message.clock.sec * 10**9 + message.clock.nanosec
         elif topic in wanted:
             messages[topic].append(message)

@@ -24,7 +24,7 @@ from robot_formation.components.catalogue import NodeKind
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
-from robot_formation.names import IMAGE_TYPE, Topic
+from robot_formation.names import IMAGE_TYPE, Topic, absolute
 from robot_formation.parameters import from_mapping
 
 
@@ -125,11 +125,6 @@ class InProcessRun:
         recorder.record(name, topic.type, conversions.to_cdr(message))
 
 
-def absolute(namespace: str, name: str) -> str:
-    """Resolve a topic name as ROS does: absolute ones stay, relative ones lie in the namespace."""
-    return name if name.startswith("/") else f"{namespace}/{name}"
-
-
 def run_in_process(
     scenario: Scenario,
     bag: Path | None,
@@ -137,8 +132,11 @@ def run_in_process(
     *,
     images: bool = False,
     say: Callable[[str], None] = lambda text: None,
+    reservation: PathReservation | None = None,
 ) -> RunResult:
     """Run a scenario, record it if a path is given, and tell its progress to `say`.
+
+    A reservation of the bag's path may have been taken already; it is released at the end.
 
     Raises:
         FormationError: if a component refuses its parameters, or the bag's path is taken or can't be written.
@@ -149,7 +147,7 @@ def run_in_process(
     run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
     with contextlib.ExitStack() as stack:
         if bag is not None:
-            stack.enter_context(PathReservation(bag))
+            stack.enter_context(reservation or PathReservation(bag))
             check_free(bag)
             run.recorder = Recorder(bag, metadata)
             stack.callback(run.recorder.close)

@@ -20,7 +20,7 @@ from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters
 from robot_formation.control.alignment import AlignmentParameters
 from robot_formation.control.alignment_state import AlignmentState
-from robot_formation.experiment.in_process import InProcessRun, absolute
+from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
@@ -40,7 +40,7 @@ class IdealRun(InProcessRun):
         self._predicting: set[str] = set()
         self._changes: dict[str, Motion] = {}  # what was commanded in this timestep less what was predicted
         self._camera_errors: dict[str, list[tuple[float, float]]] = defaultdict(list)
-        self._odometry = {absolute("", names.ground_truth_odom(robot).name): robot for robot in scenario.robots}
+        self._odometry = {names.absolute("", names.ground_truth_odom(robot).name): robot for robot in scenario.robots}
         world = from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world")
         self._surface = world.make_surface()
         self._face = TargetFace(Camera(self._surface, world), world)
@@ -54,7 +54,7 @@ class IdealRun(InProcessRun):
                 self._predictors[hosted.namespace] = hosted.component
 
     def _send(self, namespace: str, topic: names.Topic, message: Any) -> None:
-        if (robot := self._odometry.get(absolute(namespace, topic.name))) is not None:
+        if (robot := self._odometry.get(names.absolute(namespace, topic.name))) is not None:
             self._poses[robot] = _pose(message.pose.pose)
         elif topic == names.ALIGNMENT and AlignmentState.parse(message.data) is AlignmentState.PREDICT:
             self._predicting.add(namespace)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import deque
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -13,31 +13,63 @@ from robot_formation import conversions, names
 from robot_formation.control.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 
-_SAME_M = 1e-6
+_SAME = 1e-6  # metres and radians
 
 
 @dataclass
 class _Heard:
-    """What was heard of a robot: stamps [ns] with poses, finished moves, and timesteps not yet told."""
+    """What was heard of a robot: stamps [ns] with poses, finished moves and timesteps; and what was said.
+
+    A topic keeps its order, so these lists are sorted by stamp; between topics there is no order.
+    """
 
     poses: list[tuple[int, Motion]] = field(default_factory=list)
     moves: list[tuple[int, Motion]] = field(default_factory=list)
-    timesteps: deque[tuple[int, Motion]] = field(default_factory=deque)
+    timesteps: list[tuple[int, Motion]] = field(default_factory=list)
     told: int = 0
     begun: int = 0
-    told_until_ns: int = -1
+    state: str = ""
 
-    def pose_between(self, after_ns: int, until_ns: int) -> Motion | None:
-        """Return the last pose stamped in (after, until]."""
-        found = [pose for stamp, pose in self.poses if after_ns < stamp <= until_ns]
-        return found[-1] if found else None
+    def moves_between(self, after_ns: int, until_ns: int) -> list[tuple[int, Motion]]:
+        """List the moves that ended in (after, until]."""
+        return self.moves[
+            bisect_right(self.moves, after_ns, key=_stamp) : bisect_right(self.moves, until_ns, key=_stamp)
+        ]
+
+    def timestep_moves(self, timestep: int, after_ns: int) -> list[Motion] | None:
+        """List the moves of a finished timestep, counted from 1, that began after a stamp; None until all are there."""
+        if len(self.timesteps) < timestep:
+            return None
+        until_ns, displacement = self.timesteps[timestep - 1]
+        # The fine-tuner counts no move whose displacement the drive couldn't measure.
+        moves = [move for _, move in self.moves_between(after_ns, until_ns) if move.finite]
+        total = Motion()
+        for move in moves:
+            total = total.then(move)
+        missing = (total.x_m - displacement.x_m, total.y_m - displacement.y_m, total.yaw_rad - displacement.yaw_rad)
+        return moves if all(abs(part) < _SAME for part in missing) else None
+
+    def resting_pose(self, until_ns: int) -> Motion | None:
+        """Return the true pose after the last move until a stamp; None until it is there.
+
+        A robot has a true pose at the very end of each move, so an earlier one is another place's.
+        """
+        move = bisect_right(self.moves, until_ns, key=_stamp)
+        pose = bisect_right(self.poses, until_ns, key=_stamp)
+        if pose == 0 or (move > 0 and self.poses[pose - 1][0] < self.moves[move - 1][0]):
+            return None
+        return self.poses[pose - 1][1]
+
+
+def _stamp(entry: tuple[int, Motion]) -> int:
+    return entry[0]
 
 
 class Progress:
     """Follows the messages of a run. Feed it absolute topic names with their messages.
 
-    Topics may come in any order, as they do over the middleware: a timestep is told once everything that belongs to it
-    has arrived, which the stamps and the sum of its moves tell.
+    Messages of different topics may come in any order, as they do over the middleware: a timestep is told once
+    everything that belongs to it has arrived, which the stamps and the sum of its moves tell.
     """
 
     def __init__(
@@ -46,13 +78,13 @@ class Progress:
         self._timesteps = timesteps
         self._say = say
         self._elapsed = elapsed
-        robots = [names.LEADER, *(names.follower(n) for n in range(1, followers + 1))]
-        self._heard = {robot: _Heard() for robot in robots}
+        self._followers = [names.follower(n) for n in range(1, followers + 1)]
+        self._heard = {robot: _Heard() for robot in (names.LEADER, *self._followers)}
         self._handlers: dict[str, Callable[[Any], None]] = {}
-        for robot in robots:
+        for robot in self._heard:
             self._handlers[f"/{names.ground_truth_pose(robot).name}"] = partial(self._pose, robot)
-        for robot in robots[1:]:
             self._handlers[f"/{robot}/{names.MOVED.name}"] = partial(self._moved, robot)
+        for robot in self._followers:
             self._handlers[f"/{robot}/{names.ALIGNMENT.name}"] = partial(self._alignment, robot)
             self._handlers[f"/{robot}/{names.DISPLACEMENT.name}"] = partial(self._displacement, robot)
 
@@ -61,12 +93,24 @@ class Progress:
         """The topics that it wants to hear."""
         return list(self._handlers)
 
+    @property
+    def complete(self) -> bool:
+        """Whether every timestep has been told."""
+        return all(self._heard[robot].told >= self._timesteps for robot in self._followers)
+
     def listen(self, topic: str, message: Any) -> None:
         """Take a message; others than those of `topics` are ignored."""
         handler = self._handlers.get(topic)
         if handler is not None:
             handler(message)
             self._tell()
+
+    def remind(self) -> None:
+        """Say what goes on between two timesteps, for a run in which one takes long."""
+        for robot in self._followers:
+            heard = self._heard[robot]
+            doing = f" ({heard.state})" if heard.state else ""
+            self._say(f"{robot} is in timestep {heard.begun}/{self._timesteps}{doing}  {self._elapsed():6.1f} s")
 
     def _pose(self, robot: str, message: Any) -> None:
         self._heard[robot].poses.append((conversions.stamp_of(message), conversions.read_pose(message.pose)))
@@ -79,56 +123,48 @@ class Progress:
 
     def _alignment(self, robot: str, message: Any) -> None:
         state = AlignmentState.parse(message.data)
+        heard = self._heard[robot]
+        heard.state = message.data
         if state is None:
             return
         if state.opens_timestep:
-            self._heard[robot].begun += 1
+            heard.begun += 1
         elif state is AlignmentState.LOST:
-            self._say(f"{robot}: lost its beacon neighbour in timestep {self._heard[robot].begun}")
+            self._say(f"{robot}: lost its beacon neighbour in timestep {heard.begun}")
 
     def _tell(self) -> None:
-        for robot, heard in self._heard.items():
-            while heard.timesteps and self._tell_next(robot, heard):
-                heard.timesteps.popleft()
+        for robot in self._followers:
+            while self._tell_next(robot):
+                pass
 
-    def _tell_next(self, robot: str, heard: _Heard) -> bool:
+    def _tell_next(self, robot: str) -> bool:
         """Say the robot's next timestep if everything of it has arrived."""
-        stamp_ns, displacement = heard.timesteps[0]
-        neighbour = self._heard[names.beacon_neighbour(robot)]
-        own_pose = heard.pose_between(heard.told_until_ns, stamp_ns)
-        # The first timestep's moves follow those of the initial alignment, which end before the neighbour's first move.
-        place = neighbour.pose_between(max(heard.told_until_ns, 0), stamp_ns)
+        heard, leader = self._heard[robot], self._heard[names.LEADER]
+        timestep = heard.told + 1
+        if len(leader.moves) < timestep:
+            return False
+        begun_ns = leader.moves[timestep - 1][0]  # the leader's move opens the timestep
+        moves = heard.timestep_moves(timestep, begun_ns)
+        if moves is None:
+            return False
+        neighbour_name = names.beacon_neighbour(robot)
+        neighbour = self._heard[neighbour_name]
+        if neighbour_name != names.LEADER and neighbour.timestep_moves(timestep, begun_ns) is None:
+            return False
+        ended_ns = heard.timesteps[timestep - 1][0]
+        own_pose, place = heard.resting_pose(ended_ns), neighbour.resting_pose(ended_ns)
         if own_pose is None or place is None:
             return False
-        moves = [move for stamp, move in heard.moves if heard.told_until_ns < stamp <= stamp_ns]
-        corrections = _after_first(moves, displacement)
-        if corrections is None:
-            return False
-        heard.told += 1
-        heard.told_until_ns = stamp_ns
-        self._say_line(robot, heard.told, corrections, own_pose, place)
+        heard.told = timestep
+        self._say_line(robot, timestep, moves[1:], own_pose, place)  # without the prediction move
         return True
 
     def _say_line(self, robot: str, timestep: int, corrections: list[Motion], own: Motion, neighbour: Motion) -> None:
         correction_m = sum(abs(move.x_m) + abs(move.y_m) for move in corrections)
         place = neighbour.then(Motion(y_m=-FORMATION_DISTANCE_M))
         error_m = math.hypot(own.x_m - place.x_m, own.y_m - place.y_m)
-        who = f"{robot}  " if len(self._heard) > 2 else ""
+        who = f"{robot}  " if len(self._followers) > 1 else ""
         self._say(
             f"{who}timestep {timestep:2d}/{self._timesteps}  correction {correction_m * 100:5.1f} cm  "
             f"formation error {error_m * 100:5.2f} cm  {self._elapsed():6.1f} s"
         )
-
-
-def _after_first(moves: list[Motion], displacement: Motion) -> list[Motion] | None:
-    """Of the last moves that compose to the displacement return all but the first, which is the prediction move.
-
-    None if no such moves have arrived.
-    """
-    for first in range(len(moves) - 1, -1, -1):
-        total = Motion()
-        for move in moves[first:]:
-            total = total.then(move)
-        if math.hypot(total.x_m - displacement.x_m, total.y_m - displacement.y_m) < _SAME_M:
-            return moves[first + 1 :]
-    return None

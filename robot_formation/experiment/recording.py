@@ -9,6 +9,7 @@ from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.bag.reader import Bag
 from robot_formation.bag.recorder import METADATA_NAME
@@ -26,14 +27,20 @@ class Recording:
         notes: what a reader should know: parameters and versions that were other ones.
     """
 
-    def __init__(self, bag: Bag) -> None:
-        self._bag = bag
+    def __init__(self, opened: Bag, namespace: str | None = None) -> None:
+        """Choose the run's formation: the one in this namespace ('/': the root), None: wherever there is one.
+
+        Raises:
+            BagError: there is none, or there are several to choose from.
+        """
+        bag = self._bag = FormationBag(opened, namespace)
         numbers = {int(match[1]) for topic in bag.topics if (match := re.match(r"/follower_([1-9]\d*)/", topic))}
         self.followers = [names.follower(number) for number in sorted(numbers)]
         if not self.followers:
             raise BagError(f"{bag.path} has no topics of a follower; give the bag of 'formation run'")
         details = bag.metadata(METADATA_NAME)
-        self._parameters: dict[str, dict[str, Any]] = _parsed(details.get("parameters", ""))
+        parameters = _parsed(details.get("parameters", ""))
+        self._parameters = {kind: values for kind, values in parameters.items() if isinstance(values, dict)}
         self.notes = _changes({**_parsed(details.get("versions", "")), "commit": details.get("git_commit", "")})
         if not self._parameters:
             self.notes.append("the bag doesn't tell the nodes' parameters: those of config/ are taken")
@@ -51,7 +58,12 @@ class Recording:
         name = absolute(robot, topic)
         self._bag.require({name: topic.type})
         for message in self._bag.raw_messages([name]):
-            yield conversions.from_cdr(message.cdr, topic.type)
+            try:
+                decoded = conversions.from_cdr(message.cdr, topic.type)
+            except Exception as error:  # the middleware's decoders have no common error
+                reason = " ".join(str(error).split()) or type(error).__name__
+                raise BagError(f"{self._bag.path}: a message on '{name}' can't be decoded: {reason}") from error
+            yield decoded
 
     def any_messages(self, robot: str, topic: names.Topic) -> list[Any]:
         """List the messages of a robot's topic; none if it wasn't recorded.
@@ -76,7 +88,7 @@ class Recording:
 
 def absolute(robot: str, topic: names.Topic) -> str:
     """Name a robot's topic in full."""
-    return topic.name if topic.name.startswith("/") else f"/{robot}/{topic.name}"
+    return names.absolute(f"/{robot}", topic.name)
 
 
 def host(kind: str, parameters: Any, robot: str, notes: list[str]) -> tuple[Component, list[tuple[str, Any]]]:
@@ -109,7 +121,7 @@ def equal(recorded: Sequence[Any], today: Sequence[Any]) -> bool:
 def _parsed(text: str) -> dict[str, Any]:
     try:
         found = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
 
@@ -118,7 +130,7 @@ def _changes(recorded: dict[str, str]) -> list[str]:
     """Say which versions were others when the bag was recorded."""
     today = {**versions(), "commit": git_commit()}
     return [
-        f"recorded with {name} {recorded[name]}, now {today[name] or 'unknown'}"
+        f"recorded with {name} {recorded[name]!s:.60}, now {today[name] or 'unknown'}"
         for name in recorded
         if recorded[name] and name in today and recorded[name] != today[name]
     ]

@@ -9,17 +9,25 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from robot_formation import names
 from robot_formation.components.catalogue import KINDS, NodeKind
-from robot_formation.errors import FormationError
+from robot_formation.errors import FormationError, shown
 from robot_formation.experiment.camera_check import check_camera
 from robot_formation.experiment.drive_check import check_curves
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
-from robot_formation.parameters import ParameterError, flatten, from_mapping, parameter, specs, suggestion, to_mapping
+from robot_formation.parameters import (
+    ParameterError,
+    check_as,
+    flatten,
+    from_mapping,
+    parameter,
+    specs,
+    suggestion,
+    to_mapping,
+)
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
+from robot_formation.yaml_files import YamlError, parse_yaml, read_yaml
 
 # Parameters that follow from the setup, and what to set instead.
 _FIXED = {
@@ -169,7 +177,7 @@ def load(path: Path) -> Scenario:
         ScenarioError: if it can't be read or isn't a mapping.
         ParameterError: on unknown or wrong entries.
     """
-    content = read_yaml(path)
+    content = _read(path)
     if not isinstance(content, Mapping):
         raise ScenarioError(
             f"{path}: a scenario is a mapping with entries like 'seed' and 'leader'; see config/scenarios"
@@ -185,8 +193,8 @@ def load(path: Path) -> Scenario:
         section = content.get(kind, {})
         section = {} if section is None else section  # an entry with nothing below it
         if not isinstance(section, Mapping):
-            raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {section!r}")
-        sections[kind] = _checked(kind, flatten(section), where=f"{path}: {kind}")
+            raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {shown(section)}")
+        sections[kind] = _checked(kind, flatten(section, where=f"{path}: {kind}"), where=f"{path}: {kind}")
     return Scenario(setup, sections)
 
 
@@ -198,8 +206,13 @@ def _checked(kind: str, section: Mapping[str, Any], *, where: str) -> dict[str, 
     return {name: checked[name] for name in section}
 
 
-def override(scenario: Scenario, settings: Sequence[str]) -> Scenario:
+def override(scenario: Scenario, settings: Sequence[str], *, source: str = "--set") -> Scenario:
     """Apply settings like 'predictor.forgetting=0.95' or 'seed=3'; the value is read as YAML.
+
+    Args:
+        scenario: what is changed.
+        settings: KEY=VALUE each.
+        source: where the user wrote them, for messages.
 
     Raises:
         ScenarioError: if a setting has no '=' or names no node.
@@ -209,13 +222,35 @@ def override(scenario: Scenario, settings: Sequence[str]) -> Scenario:
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not equals:
-            raise ScenarioError(f"--set takes KEY=VALUE, like predictor.forgetting=0.95, not '{setting}'")
-        try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError:
-            raise ScenarioError(f"--set {key}: '{text}' is no YAML value") from None
-        values.append((key, value))
-    return with_values(scenario, values)
+            raise ScenarioError(f"{source} takes KEY=VALUE, like predictor.forgetting=0.95, not '{setting}'")
+        values.append((key, _yaml_value(text, f"{source} {key}")))
+    return with_values(scenario, values, source=source)
+
+
+def _yaml_value(text: str, subject: str) -> Any:
+    try:
+        return parse_yaml(text)
+    except YamlError as error:
+        raise ScenarioError(f"{subject}: {shown(text)} is no YAML value: {error.problem}") from None
+
+
+def with_option(scenario: Scenario, key: str, value: Any, source: str) -> Scenario:
+    """Set 'seed' or 'NODE.PARAMETER' from an option of its own; errors name only the option.
+
+    Args:
+        scenario: what is changed.
+        key: an entry of the setup, or a node's parameter.
+        value: the value; a text is read as YAML unless the parameter is a text.
+        source: what the user wrote, like '--seed' or 'seed:='; errors begin with it.
+
+    Raises:
+        FormationError: on a wrong value.
+    """
+    kind, dot, name = key.partition(".")
+    spec = specs(KINDS[kind].parameter_class())[name] if dot else specs(Setup)[key]
+    if isinstance(value, str) and spec.type is not str:
+        value = _yaml_value(value, source)
+    return with_value(scenario, key, check_as(spec, value, source))
 
 
 def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
@@ -223,22 +258,22 @@ def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
     return with_values(scenario, [(key, value)])
 
 
-def with_values(scenario: Scenario, values: Sequence[tuple[str, Any]]) -> Scenario:
+def with_values(scenario: Scenario, values: Sequence[tuple[str, Any]], *, source: str = "--set") -> Scenario:
     """Set values together, so that only their sum has to make sense. Errors as for `override`."""
     setup = to_mapping(scenario.setup)
     sections = {kind: dict(section) for kind, section in scenario.sections.items()}
     for key, value in values:
         kind, dot, name = key.partition(".")
         if dot and kind not in KINDS:
-            raise ParameterError(f"--set: no node '{kind}'{suggestion(kind, KINDS)}")
+            raise ParameterError(f"{source}: no node '{kind}'{suggestion(kind, KINDS)}")
         if not dot and key not in setup:
-            raise ParameterError(f"--set: no entry '{key}'{suggestion(key, [*setup, *(f'{k}.' for k in KINDS)])}")
+            raise ParameterError(f"{source}: no entry '{key}'{suggestion(key, [*setup, *(f'{k}.' for k in KINDS)])}")
         if dot:
-            sections.setdefault(kind, {}).update(flatten({name: value}))
+            sections.setdefault(kind, {}).update(flatten({name: value}, where=source))
         else:
             setup[key] = value
-    checked = {kind: _checked(kind, section, where=f"--set: {kind}") for kind, section in sections.items()}
-    return Scenario(from_mapping(Setup, setup, where="--set"), checked)
+    checked = {kind: _checked(kind, section, where=f"{source}: {kind}") for kind, section in sections.items()}
+    return Scenario(from_mapping(Setup, setup, where=source), checked)
 
 
 def with_surface(scenario: Scenario, surface: str) -> Scenario:
@@ -271,25 +306,12 @@ def parameter_file(path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _parameter_file(path: Path, changed_ns: int) -> dict[str, Any]:
-    content = read_yaml(path)
+    content = _read(path)
     try:
-        return flatten(content["/**"]["ros__parameters"])
+        return flatten(content["/**"]["ros__parameters"], where=str(path))
     except (KeyError, TypeError, AttributeError):
         raise ScenarioError(f"{path}: a ROS parameter file begins with '/**:' and 'ros__parameters:'") from None
 
 
-def read_yaml(path: Path) -> Any:
-    """Read a YAML file safely.
-
-    Raises:
-        ScenarioError: if it is missing, unreadable or no YAML.
-    """
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: can't read it: {getattr(error, 'strerror', None) or error}") from None
-    except (yaml.YAMLError, RecursionError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f" in line {mark.line + 1}" if mark else ""
-        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
-        raise ScenarioError(f"{path}: no valid YAML{where}: {problem}") from None
+def _read(path: Path) -> Any:
+    return read_yaml(path, refuse=ScenarioError, remedy="give a scenario's YAML file, like those in config/scenarios")

@@ -15,8 +15,7 @@ import re
 from pathlib import Path
 
 from robot_formation.experiment.domain import FIRST_PORT, domain_ports
-
-SHARED_MEMORY = Path("/dev/shm")
+from robot_formation.shared_memory_space import SHARED_MEMORY
 
 _NAME = re.compile(r"(?:sem\.)?(?P<group>fastrtps_(?:[0-9a-f]{16}|port(?P<port>\d+)))(?P<part>_el|_sl|_mutex)?")
 

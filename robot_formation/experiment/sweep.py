@@ -16,12 +16,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from robot_formation.analysis.conditions import conditions
 from robot_formation.analysis.quantities import analyse
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.oracle import IDEAL, IdealRun
+from robot_formation.experiment.pool import run_parallel
+from robot_formation.files import MOST_RECORD_BYTES, check_file, read_file
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.parameters import suggestion
 from robot_formation.surface import SURFACES
@@ -113,6 +116,12 @@ class Plan:
             for surface in self.surfaces:
                 build(Task(track, surface, self.predictors[0], self.seeds[0]), self.settings).check()
 
+    def conditions(self) -> dict[str, Any]:
+        """List the conditions of all runs by name, as those of a single run."""
+        scenario = build(Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0]), self.settings)
+        found = conditions({kind: scenario.parameters(kind) for kind in ("world", "fine_tuner")})
+        return {**found, "in_process": True}
+
     def tasks(self) -> Iterator[Task]:
         """Yield every run; all predictors of a seed together, so that an unfinished sweep has pairs."""
         for seed in self.seeds:
@@ -202,12 +211,22 @@ class Table:
     @staticmethod
     def _require_same(record: Path, plan: Plan) -> None:
         try:
-            earlier = json.loads(record.read_text(encoding="utf-8"))
-            settings = list(earlier["settings"])
-        except (OSError, ValueError, KeyError, TypeError):
+            earlier = json.loads(read_file(record, MOST_RECORD_BYTES))
+            settings = [str(setting) for setting in earlier["settings"]]
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             raise SweepError(f"{record}: no record of a sweep; choose another --out") from None
         if settings != list(plan.settings):
-            raise SweepError(f"{record.parent} holds a sweep with other settings ({settings}); choose another --out")
+            differing = _difference(settings, plan.settings)
+            raise SweepError(f"{record.parent} holds a sweep with other settings: {differing}; choose another --out")
+
+
+def _difference(earlier: Sequence[str], now: Sequence[str]) -> str:
+    """Say which settings of an earlier sweep differ from those of now."""
+    gone = [setting for setting in earlier if setting not in now]
+    new = [setting for setting in now if setting not in earlier]
+    said = [f"it was made with --set {' --set '.join(gone)}"] if gone else []
+    said += [f"{'and' if gone else 'it was made'} without --set {' --set '.join(new)}"] if new else []
+    return " ".join(said) or f"it was made with them in another order, --set {' --set '.join(earlier)}"
 
 
 def read_rows(path: Path) -> Iterator[Row]:
@@ -218,6 +237,7 @@ def read_rows(path: Path) -> Iterator[Row]:
     """
     columns = {field.name: str(field.type) for field in fields(Row)}
     try:
+        check_file(path)
         with path.open(newline="", encoding="utf-8") as file:
             lines = file.readlines()
     except (OSError, ValueError) as error:
@@ -247,17 +267,13 @@ def chosen(plan: Plan, rows: Mapping[Task, Row]) -> list[Row]:
 
 
 def carry_out(tasks: Iterable[Task], settings: Sequence[str], jobs: int) -> Iterator[Row]:
-    """Run tasks on this machine's cores by joblib; yield rows as they come.
+    """Run tasks on this machine's cores by joblib; yield rows in the order of the tasks, each as soon as it is there.
 
     Raises:
         SweepError: if a run can't come to its end, or a worker process dies.
     """
-    from joblib import Parallel, delayed
-
-    # One run in a worker at a time; a few wait, so that no worker idles.
-    pool = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="3*n_jobs")
     try:
-        yield from pool(delayed(run_task)(task, settings) for task in tasks)
+        yield from run_parallel(run_task, ((task, settings) for task in tasks), jobs)
     except BrokenExecutor:
         raise SweepError(f"a worker process died (too little memory for --jobs {jobs}?); {_GOES_ON}") from None
 

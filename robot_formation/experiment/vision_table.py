@@ -12,6 +12,7 @@ from typing import Any
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.camera_samples import CameraSample
 from robot_formation.experiment.vision_grid import Position
+from robot_formation.files import MOST_RECORD_BYTES, check_file, read_file
 from robot_formation.vision.block import Block
 
 TABLE_NAME = "vision.csv"
@@ -83,6 +84,7 @@ def read_table(path: Path) -> Iterator[CameraSample]:
         CalibrationError: if the file is no such table.
     """
     try:
+        check_file(path)
         with path.open(newline="", encoding="utf-8") as file:
             # A number that was cut off is a number too: only a line with its end is whole.
             reader = csv.reader([line for line in file if line.endswith("\n")])
@@ -120,9 +122,9 @@ def _rows(samples: Iterable[CameraSample]) -> Iterator[list[Any]]:
 
 def _require_same(recorded: Path, record: Mapping[str, Any]) -> None:
     try:
-        earlier = json.loads(recorded.read_text(encoding="utf-8"))
+        earlier = json.loads(read_file(recorded, MOST_RECORD_BYTES))
         different = [name for name in {**earlier, **record} if earlier.get(name) != record.get(name)]
-    except (OSError, ValueError, TypeError, AttributeError):
+    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
         raise CalibrationError(f"{recorded}: no record of a calibration; start anew with --force") from None
     if different:
         name = different[0]

@@ -14,6 +14,7 @@ from pathlib import Path
 import yaml
 
 from robot_formation.experiment.run_result import NodeUsage
+from robot_formation.launching.outcome import manner
 from robot_formation.launching.processes import Process
 
 _PR_SET_PDEATHSIG = 1
@@ -49,6 +50,7 @@ class Child:
                 preexec_fn=_die_with_parent,
             )
         self.exit_code: int | None = None
+        self.forced = False
         self.usage: NodeUsage | None = None
 
     @property
@@ -66,16 +68,33 @@ class Child:
         return self.exit_code
 
     def signal(self, number: signal.Signals) -> None:
-        """Send a signal if the process still runs."""
+        """Send a signal if the process still runs; `forced` tells that it didn't end when it was asked to."""
         if self.poll() is None:
+            self.forced = self.forced or number == signal.SIGKILL
             os.kill(self._popen.pid, number)
+
+    @property
+    def pid(self) -> int:
+        """The process id."""
+        return self._popen.pid
+
+    @property
+    def state(self) -> str:
+        """The state of its process as a letter: R, S, D, T (stopped), t (held by a debugger), Z; empty if gone."""
+        try:
+            stat = Path(f"/proc/{self.pid}/stat").read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return ""
+        return stat.rpartition(")")[2].split()[0]
 
     @property
     def death(self) -> str:
         """Say how it ended."""
         code = self.exit_code or 0
-        how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        last = self.last_words()
+        how = manner(code)
+        lines = self._text().strip().splitlines()
+        match = _LOG_LINE.match(lines[-1]) if lines else None
+        last = "" if match and match["level"] == "INFO" else self.last_words()  # that it was ready is no reason
         return f"{how}: {last}" if last else how
 
     def last_words(self) -> str:

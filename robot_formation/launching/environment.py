@@ -6,6 +6,8 @@ import os
 import sys
 from pathlib import Path
 
+from robot_formation.loopback import use_loopback
+
 FOREIGN = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")
 """Variables that would let a run's nodes talk beyond this machine, or not find each other."""
 
@@ -28,6 +30,7 @@ def node_environment(domain: int, log_folder: Path) -> dict[str, str]:
     for name in FOREIGN:
         environment.pop(name, None)
     environment.setdefault("AMENT_PREFIX_PATH", sys.prefix)
+    use_loopback(environment)
     # Many small processes on few cores: a pool of threads for linear algebra in each would only get in the way.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         environment.setdefault(name, "1")

@@ -3,34 +3,47 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
 import signal
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.place import CUT_OFF_SUFFIX, PARTIAL_SUFFIX, PathReservation, check_free
-from robot_formation.bag.recover import recover
+from robot_formation.bag.place import PARTIAL_SUFFIX, PathReservation, check_free, recover_hint
 from robot_formation.experiment.domain import DomainReservation
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.experiment.shared_memory import clean_orphans, fast_dds_files, is_of_domain
+from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
-from robot_formation.launching.processes import RECORDER, processes
+from robot_formation.launching.outcome import verdict
+from robot_formation.launching.processes import RECORDER, Process, processes
+from robot_formation.launching.run_folder import run_folder
+from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
+
+if TYPE_CHECKING:
+    from robot_formation.nodes.monitor import Monitor
 
 _POLL_S = 0.05
+_REMIND_S = 15.0  # without a line of progress
 _CLEANING_ROUNDS = 6
+_CAUGHT_UP_REPORTS, _CATCH_UP_S = 3, 10.0
+_ORDERLY = (exit_codes.DONE, exit_codes.LOST)
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
-_RECORDER_STOP_SIGNALS = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 1.0))
+RECORDER_PATIENCE_S = (10.0, 5.0)
+"""How long the recorder may take after SIGINT and after SIGTERM, s."""
+_RECORDER_STOP_SIGNALS = (
+    (signal.SIGINT, RECORDER_PATIENCE_S[0]),
+    (signal.SIGTERM, RECORDER_PATIENCE_S[1]),
+    (signal.SIGKILL, 1.0),
+)
 
 
 def _clean_shared_memory(domain: int) -> None:
@@ -51,9 +64,10 @@ class Launcher:
         bag: where the recorder writes; None records nothing.
         images: whether pictures are recorded too.
         say: takes the lines of progress.
-        silence_s: wall seconds without any sign of life after which the run is given up; longer in slow motion.
+        silence_s: wall seconds in which no robot does anything, after which the run is given up; longer in slow motion.
         callback_delay_s: longest random delay before each callback of every node (tests).
         on_start: called once all processes run, with the ROS domain and the process ids by node name (tests).
+        reservation: of the bag's path, if it has been taken already; it is released at the end.
     """
 
     scenario: Scenario
@@ -63,8 +77,10 @@ class Launcher:
     silence_s: float = 90.0
     callback_delay_s: float = 0.0
     on_start: Callable[[int, dict[str, int]], None] | None = None
+    reservation: PathReservation | None = None
     _children: list[Child] = field(default_factory=list, init=False)
     _interrupted: int = field(default=0, init=False)
+    _said_at: float = field(default=0.0, init=False)
 
     def run(self) -> RunResult:
         """Run to the end; whatever happens, no process, file or shared memory is left but the bag.
@@ -75,11 +91,11 @@ class Launcher:
         """
         with contextlib.ExitStack() as stack:
             if self.bag is not None:
-                stack.enter_context(PathReservation(self.bag))
+                stack.enter_context(self.reservation or PathReservation(self.bag))
                 check_free(self.bag)
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="robot_formation_")))
-            domain = stack.enter_context(DomainReservation())
             stack.enter_context(self._signals())
+            folder = stack.enter_context(run_folder())
+            domain = stack.enter_context(DomainReservation())
             # Those of every domain: also what a run left whose launcher was killed itself.
             stack.callback(_clean_shared_memory, domain)
             result = RunResult(exit_codes.NODE_DIED, self.bag)
@@ -94,54 +110,83 @@ class Launcher:
                 result.stopping_s = time.monotonic() - ended
                 result.usage = {child.name: child.usage for child in self._children if child.usage}
                 result.warnings = [text for child in self._children for text in child.warnings()]
-                self._rescue_bag(result)
+                self._settle(result)
         return result
 
-    def _start(self, folder: Path, environment: dict[str, str]) -> None:
-        for process in processes(self.scenario, self.bag, images=self.images):
+    def _start(self, table: list[Process], folder: Path, environment: dict[str, str]) -> None:
+        for process in table:
+            if self._interrupted:
+                return
             if self.callback_delay_s and process.executable != RECORDER:
                 delay = {"callback_delay_s": self.callback_delay_s}
                 process = type(process)(process.executable, process.namespace, {**process.parameters, **delay})
             self._children.append(Child(process, folder, environment))
         if self.on_start is not None:
-            self.on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child._popen.pid for child in self._children})
+            self.on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in self._children})
 
     def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""
+        table = processes(self.scenario, self.bag, images=self.images)
+        self._tell(f"starting {len(table)} nodes ...")
         from robot_formation.nodes.monitor import Monitor  # here, since it needs the environment of the wheels
 
         began = time.monotonic()
         setup, timesteps = self.scenario.setup, self.scenario.parameters("leader")["timesteps"]
-        factor = self.scenario.parameters("world")["real_time_factor"]
-        silence_s = self.silence_s / (min(factor, 1.0) or 1.0)
-        progress = Progress(setup.followers, timesteps, self.say, lambda: time.monotonic() - began)
+        progress = Progress(setup.followers, timesteps, self._tell, lambda: time.monotonic() - began)
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:
-            self._start(folder, environment)
-            last, heard = time.monotonic(), 0
+            self._start(table, folder, environment)
+            watchdog = Watchdog([child.name for child in self._children], idle_s=self._patience_s())
             while True:
                 monitor.spin(_POLL_S)
-                now = time.monotonic()
-                if monitor.messages != heard:
-                    last, heard = now, monitor.messages
-                    result.startup_s = result.startup_s or now - began
+                if monitor.messages and not result.startup_s:
+                    result.startup_s = time.monotonic() - began
                 if self._interrupted:
                     return exit_codes.INTERRUPTED, "interrupted"
                 ended = next((child for child in self._children if child.poll() is not None), None)
                 if ended is not None:
-                    monitor.drain(_POLL_S)
-                    return self._verdict(ended)
-                if now - last > silence_s:
-                    return exit_codes.NODE_DIED, f"no node has shown a sign of life for {silence_s:.0f} s"
+                    monitor.drain(_POLL_S, lambda: progress.complete)
+                    verdict = self._verdict(ended)
+                    self._resume(monitor)
+                    return verdict
+                if watchdog.due and (reason := self._look(watchdog, monitor)):
+                    self._tell(f"{reason}; ending the run ...")
+                    self._resume(monitor)
+                    return exit_codes.NODE_DIED, reason
+                if time.monotonic() - self._said_at > _REMIND_S:
+                    progress.remind()
+
+    def _look(self, watchdog: Watchdog, monitor: Monitor) -> str:
+        states = {child.name: child.state for child in self._children}
+        return watchdog.look(states, monitor.reports, monitor.messages)
+
+    def _resume(self, monitor: Monitor) -> None:
+        """Let stopped nodes go on, so that they end in good order; a recorder first takes what was kept for it."""
+        for child in [child for child in self._children if child.state == STOPPED]:
+            child.signal(signal.SIGCONT)
+            if child.process.executable == RECORDER:
+                enough, end = monitor.reports[child.name] + _CAUGHT_UP_REPORTS, time.monotonic() + _CATCH_UP_S
+                while monitor.reports[child.name] < enough and time.monotonic() < end and not self._interrupted:
+                    monitor.spin(_POLL_S)
+
+    def _patience_s(self) -> float:
+        factor = self.scenario.parameters("world")["real_time_factor"]
+        return self.silence_s / (min(factor, 1.0) or 1.0)
+
+    def _tell(self, text: str) -> None:
+        self._said_at = time.monotonic()
+        self.say(text)
 
     def _verdict(self, ended: Child) -> tuple[int, str]:
-        code, executable = ended.exit_code, ended.process.executable
-        if code == 0 and executable == "leader":
-            return exit_codes.DONE, ""
-        if code == exit_codes.LOST and executable in ("fine_tuner", "world"):
-            return exit_codes.LOST, ended.last_words()
+        code = verdict(ended.process.executable, ended.exit_code or 0)
         if code == exit_codes.BAD_INPUT:
             raise RunError(f"{ended.name}: {ended.last_words()}")
+        if code == exit_codes.DONE:
+            # What such a node had still to do is missing.
+            stopped = next((child for child in self._children if child.state == STOPPED), None)
+            return (exit_codes.NODE_DIED, stopped_text(stopped.name)) if stopped else (exit_codes.DONE, "")
+        if code == exit_codes.LOST:
+            return exit_codes.LOST, ended.last_words()
         return exit_codes.NODE_DIED, f"node {ended.name} {ended.death}"
 
     def _stop(self) -> None:
@@ -161,29 +206,37 @@ class Launcher:
                 if self._interrupted > max(interrupts, 1):
                     break  # asked again: no more patience with this signal
 
-    def _rescue_bag(self, result: RunResult) -> None:
-        """Finish a bag that its recorder could not finish."""
-        if self.bag is None or self.bag.exists():
-            return
-        if any(
-            child.exit_code == exit_codes.BAD_INPUT for child in self._children if child.process.executable == RECORDER
-        ):
+    def _settle(self, result: RunResult) -> None:
+        """Judge what came out after the run's own end: a recorder that failed, its bag, and other nodes' deaths."""
+        if result.exit_code in _ORDERLY:
+            for child in self._children:
+                if child.exit_code in _ORDERLY:
+                    continue
+                how = "had to be killed, since it did not end when it was asked to" if child.forced else child.death
+                if child.process.executable == RECORDER:
+                    result.exit_code, result.reason = exit_codes.NODE_DIED, f"node {child.name} {how}"
+                else:
+                    result.warnings.append(f"node {child.name} {how}, after the run's end")
+        if self.bag is not None:
+            self._settle_bag(self.bag, result)
+
+    def _settle_bag(self, bag: Path, result: RunResult) -> None:
+        recorders = [child for child in self._children if child.process.executable == RECORDER]
+        if any(child.exit_code == exit_codes.BAD_INPUT for child in recorders):
             result.bag = None  # it never opened a bag: what lies there is somebody else's
             return
-        partial = self.bag.with_name(self.bag.name + PARTIAL_SUFFIX)
-        if not partial.exists():
-            result.bag = None
+        result.bag, problem = rescue(bag)
+        if problem:
+            result.warnings.append(problem)
+        if result.bag is None:
+            if result.exit_code in _ORDERLY:
+                result.exit_code, result.reason = exit_codes.NODE_DIED, f"the recorder has left no bag at {bag}"
             return
-        cut_off = self.bag.with_name(self.bag.name + CUT_OFF_SUFFIX)
-        partial.rename(cut_off)  # the whole bag is written under the partial one's name first
-        try:
-            report = recover(cut_off, self.bag)
-        except BagError as error:
-            result.warnings.append(str(error))
-            result.bag = None
-            return
-        if report.damaged_chunks == 0:  # what else is missing had not been written: nothing more to get out of it
-            shutil.rmtree(cut_off)
+        hint = recover_hint(bag.with_name(bag.name + PARTIAL_SUFFIX))
+        result.reason = result.reason.replace(hint, f" (what was written is in {bag})")
+        with contextlib.suppress(BagError):
+            if missing := missing_messages(result.bag):
+                result.warnings.append(missing)
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:

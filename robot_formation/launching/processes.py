@@ -15,6 +15,7 @@ from robot_formation.experiment.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario
 
 RECORDER = "recorder"
+PROGRESS = "progress"
 
 
 @dataclass(frozen=True)
@@ -28,14 +29,16 @@ class Process:
     @property
     def name(self) -> str:
         """The node's full name, for people."""
-        return f"{self.namespace.rstrip('/')}/{self.executable}"
+        return _inside(self.namespace, self.executable)
 
     def ros_parameters(self) -> dict[str, Any]:
         """Give the parameters as a ROS parameter file holds them: no empty lists, ROS can't tell their type."""
         return {name: value for name, value in self.parameters.items() if value != []}
 
 
-def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, patience_s: float = 60.0) -> list[Process]:
+def processes(
+    scenario: Scenario, bag: Path | None, *, images: bool = False, patience_s: float = 60.0, namespace: str = "/"
+) -> list[Process]:
     """List the processes of a run in the order of their start.
 
     Args:
@@ -43,6 +46,7 @@ def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, pat
         bag: where the recorder writes; None for no recorder.
         images: whether pictures are recorded too.
         patience_s: how long a node waits for its listeners.
+        namespace: where the formation lies; one that doesn't begin with '/' gives relative ones, for launch.
     """
     host = {
         "wait_for_listeners_s": patience_s,
@@ -54,12 +58,27 @@ def processes(scenario: Scenario, bag: Path | None, *, images: bool = False, pat
         parameters = {
             "path": str(bag),
             "images": images,
+            "own_namespace": True,
             "metadata": [f"{k}={v}" for k, v in run_metadata(scenario).items()],
         }
-        found.append(Process(RECORDER, "/", parameters))
+        found.append(Process(RECORDER, namespace, parameters))
     for kind, robot in scenario.hosts():
-        found.append(Process(kind.name, f"/{robot}", {**scenario.robot_parameters(kind.name, robot), **host}))
+        values = {**scenario.robot_parameters(kind.name, robot), **host}
+        found.append(Process(kind.name, _inside(namespace, robot), values))
     return found
+
+
+def progress(scenario: Scenario, namespace: str) -> Process:
+    """Make the process that prints a launched run's progress; `formation run` follows the run itself."""
+    parameters = {"followers": scenario.setup.followers, "timesteps": scenario.parameters("leader")["timesteps"]}
+    return Process(PROGRESS, namespace, parameters)
+
+
+def _inside(namespace: str, robot: str) -> str:
+    """Name a robot's namespace ('': the formation's own) in that of its formation."""
+    if not robot:
+        return namespace
+    return f"{namespace.rstrip('/')}/{robot}" if namespace else robot
 
 
 def run_metadata(scenario: Scenario) -> dict[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import TracebackType
@@ -16,6 +17,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from robot_formation import conversions, names
+from robot_formation.loopback import PROFILES
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import qos_profile
 
@@ -23,7 +25,7 @@ from robot_formation.nodes.host import qos_profile
 _NAME = "_monitor"
 _QUIET_ROUNDS, _MOST_ROUNDS = 3, 60
 # What a process must have in common with the run's nodes to find them at once, and where rclpy writes its log.
-_JOINING = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOG_DIR")
+_JOINING = (*PROFILES, "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOG_DIR")
 
 
 @contextlib.contextmanager
@@ -45,8 +47,19 @@ def _set(values: Mapping[str, str | None]) -> None:
             os.environ[name] = value
 
 
+def topic_of(name: str) -> names.Topic:
+    """Tell type and quality of service of a topic that `Progress` wants."""
+    types = {topic.name: topic for topic in (names.MOVED, names.ALIGNMENT, names.DISPLACEMENT)}
+    return types.get(name.rpartition("/")[2]) or names.ground_truth_pose("")
+
+
 class Monitor:
-    """Listens to topics of a domain; a context manager. `spin` takes what has arrived."""
+    """Listens to topics of a domain, and to the nodes' reports; a context manager. `spin` takes what has arrived.
+
+    Attributes:
+        messages: how many have come on the topics.
+        reports: how often each node, by its full name, has reported on /diagnostics.
+    """
 
     def __init__(self, environment: Mapping[str, str], topics: list[str], listen: Callable[[str, Any], None]) -> None:
         """Join the graph.
@@ -60,16 +73,22 @@ class Monitor:
         with _variables({name: environment.get(name) for name in _JOINING}):
             domain = int(environment["ROS_DOMAIN_ID"])
             rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node(_NAME, context=self._context, start_parameter_services=False, enable_rosout=False)
+            # Here too: the middleware reads its settings when the first node is made.
+            self._node = Node(_NAME, context=self._context, start_parameter_services=False, enable_rosout=False)
         self._executor = make_executor(self._context)
         self._executor.add_node(self._node)
         self._listen = listen
         self.messages = 0
-        types = {topic.name: topic for topic in (names.MOVED, names.ALIGNMENT, names.DISPLACEMENT)}
+        self.reports: Counter[str] = Counter()
         for name in topics:
-            topic = types.get(name.rpartition("/")[2]) or names.ground_truth_pose("")
+            topic = topic_of(name)
             message_class = conversions.message_class(topic.type)
             self._node.create_subscription(message_class, name, partial(self._take, name), qos_profile(topic.qos))
+
+        health = names.DIAGNOSTICS
+        self._node.create_subscription(
+            conversions.message_class(health.type), health.name, self._take_report, qos_profile(health.qos)
+        )
 
     def spin(self, timeout_s: float) -> None:
         """Wait for a message at most so long; take it and what else is there."""
@@ -79,10 +98,12 @@ class Monitor:
             before = self.messages
             self._executor.spin_once(0.0)
 
-    def drain(self, round_s: float) -> None:
-        """Take what is still on its way: until some rounds in a row have brought nothing."""
+    def drain(self, round_s: float, enough: Callable[[], bool] = lambda: False) -> None:
+        """Take what is still on its way: until it is enough, or some rounds in a row have brought nothing."""
         quiet = 0
         for _ in range(_MOST_ROUNDS):
+            if enough():
+                return
             before = self.messages
             self.spin(round_s)
             quiet = quiet + 1 if self.messages == before else 0
@@ -101,6 +122,10 @@ class Monitor:
         # The shared memory of this participant is given back with the last reference, and rclpy's objects form cycles.
         del self._executor, self._node, self._context
         gc.collect()
+
+    def _take_report(self, message: Any) -> None:
+        for status in message.status:
+            self.reports[status.name] += 1
 
     def _take(self, topic: str, message: Any) -> None:
         self.messages += 1

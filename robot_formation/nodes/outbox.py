@@ -9,8 +9,9 @@ from typing import Any
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from robot_formation.names import IMAGE_TYPE, Topic
+from robot_formation.names import IMAGE_TYPE, Topic, absolute
 
 _STAND_IN_S = 5.0
 
@@ -80,13 +81,18 @@ class Outbox:
         publisher = self._publishers[topic]
         found = self._node.get_subscriptions_info_by_topic(publisher.topic_name)
         names = {info.node_name for info in found}
-        expected = set(topic.listeners)
-        if self._recorder and (self._record_images or topic.type != IMAGE_TYPE):
-            expected.add(self._recorder)
-        return expected <= names and publisher.get_subscription_count() >= len(found)
+        recorded = self._recorder and (self._record_images or topic.type != IMAGE_TYPE)
+        if recorded and self._recorder not in {_full_name(info) for info in found}:
+            return False
+        return names.issuperset(topic.listeners) and publisher.get_subscription_count() >= len(found)
 
     def _stood_in(self, topic: Topic) -> bool:
         """Tell whether nodes of other names listen in place of those expected: a user's own predictor, say."""
         found = self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name)
-        names = {info.node_name for info in found if not info.node_name.startswith("_")} - {self._recorder}
+        found = [info for info in found if _full_name(info) != self._recorder]
+        names = {info.node_name for info in found if not info.node_name.startswith("_")}
         return len(names) >= max(len(topic.listeners), 1)
+
+
+def _full_name(info: TopicEndpointInfo) -> str:
+    return absolute(info.node_namespace, info.node_name)

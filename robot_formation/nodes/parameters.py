@@ -12,13 +12,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from robot_formation.errors import FormationError
-from robot_formation.names import FORMATION
 from robot_formation.parameters import ParameterError, Spec, from_mapping, parameter, specs, suggestion, to_mapping
 
 T = TypeVar("T")
 
 # What rclpy itself declares or reads on every node.
-_OF_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+_QOS = "qos_overrides."
+_OF_RCLPY = ("use_sim_time", "start_type_description_service", _QOS)
 _TYPES: dict[Any, Parameter.Type] = {
     bool: Parameter.Type.BOOL,
     int: Parameter.Type.INTEGER,
@@ -29,6 +29,8 @@ _TYPES: dict[Any, Parameter.Type] = {
     tuple[str, ...]: Parameter.Type.STRING_ARRAY,
 }
 _LARGE = 1e308
+# Names that parameters had before, of which no suggestion by spelling is sure to find the new one.
+_RENAMED = {"formation": "formation_namespace"}
 AT_START = "it is used while the node starts"
 """Why the parameters that all nodes have can't be set later."""
 
@@ -37,7 +39,9 @@ AT_START = "it is used while the node starts"
 class HostParameters:
     """What every node has beside its own parameters."""
 
-    formation: str = parameter(FORMATION, "Namespace of the formation's done ticks")
+    formation_namespace: str = parameter(
+        "formation", "Namespace of the done ticks; if relative, in the namespace that the robots' lie in"
+    )
     wait_for_listeners_s: float = parameter(
         5.0, "How long a first message is held back for its listeners to appear", unit="s", low=0.0, high=3600.0
     )
@@ -123,7 +127,9 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
     given = {name: value for name, value in node._parameter_overrides.items() if not name.startswith(_OF_RCLPY)}
     for name in given:
         if name not in known:
-            raise ParameterError(f"{where}: no parameter '{name}'{suggestion(name, known)}")
+            now = _RENAMED.get(name, "")
+            hint = f"; it is called '{now}' now" if now in known else suggestion(name, known)
+            raise ParameterError(f"{where}: no parameter '{name}'{hint}")
     values = {name: _plain(known[name], item.value) for name, item in given.items()}
     objects: list[Any] = []
     for cls in classes:
@@ -139,6 +145,25 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
             ignore_override=True,
         )
     return objects
+
+
+def ros_type(spec: Spec) -> str:
+    """Name a parameter's type as ROS does: double, string[] and so on."""
+    return str(_TYPES[spec.type].name).lower().replace("_array", "[]")
+
+
+def refuse_unused_overrides(node: ParameterNode) -> None:
+    """Check that whatever was given for a subscription's quality of service has found one; call it once all are made.
+
+    Raises:
+        ParameterError: naming what has not.
+    """
+    for name in node._parameter_overrides:
+        if name.startswith(_QOS) and not node.has_parameter(name):
+            known = [known for known in node._parameters if known.startswith(_QOS)]
+            raise ParameterError(
+                f"{node.get_fully_qualified_name()}: no parameter '{name}'{suggestion(name, known) if known else ''}"
+            )
 
 
 def reasons(names: Iterable[str], fixed: Mapping[str, str]) -> dict[str, str]:
@@ -186,6 +211,8 @@ def _descriptor(spec: Spec, fixed: str) -> ParameterDescriptor:
     constraints = [f"read-only: {fixed}"] if fixed else []
     if spec.choices:
         constraints.append("one of: " + ", ".join(map(str, spec.choices)))
+    if spec.known:
+        constraints.append("known: " + ", ".join(spec.known))
     descriptor.additional_constraints = "; ".join(constraints)
     low, high = spec.low, spec.high
     if low is not None or high is not None:

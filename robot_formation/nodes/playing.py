@@ -20,8 +20,9 @@ from robot_formation import conversions, exit_codes, names
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.playback import Excerpt, Playhead, Prefetch, ScheduleErrors, make_excerpt
-from robot_formation.bag.reader import Bag, RawMessage, read_bag
+from robot_formation.bag.reader import Bag, read_bag
 from robot_formation.bag.selection import Selection
+from robot_formation.bag.source import RawMessage
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import qos_profile
 from robot_formation.nodes.keyboard import Keyboard
@@ -68,7 +69,7 @@ class PlayerParameters:
         for text in self.remap:
             source, sign, target = text.partition(":=")
             if not (sign and source.startswith("/") and target):
-                raise ParameterError(f"player: 'remap' takes texts like /from:=/to, not '{text}'")
+                raise ParameterError(f"'remap' takes texts like /from:=/to, not '{text}'")
             found[source] = target
         return found
 
@@ -134,7 +135,7 @@ class PlayerNode:
         self._executor.add_node(node)
 
     def _make_clock(self) -> Publisher:
-        topic = names.CLOCK_TOPIC
+        topic = names.ROS_CLOCK
         return self._node.create_publisher(conversions.message_class(topic.type), topic.name, qos_profile(topic.qos))
 
     def _prepare(self) -> Excerpt:
@@ -148,7 +149,7 @@ class PlayerNode:
         for name, topic in contents.items():
             if not selection.wants(name, topic.type_name):
                 continue
-            if p.clock_hz > 0.0 and name == names.CLOCK_TOPIC.name:
+            if p.clock_hz > 0.0 and name == names.ROS_CLOCK.name:
                 continue
             self._open(topic, remaps.get(name, name))
         if not self._outputs:
@@ -299,7 +300,7 @@ class Executable:
     def __init__(self, node: ParameterNode) -> None:
         (self._parameters,) = declare(node, PlayerParameters, fixed=PlayerNode.fixed)
         if not self._parameters.bag:
-            raise ParameterError("player: say which bag is played, with the parameter 'bag'")
+            raise ParameterError("say which bag is played, with the parameter 'bag'")
         self._node = node
         self._bag = read_bag(Path(self._parameters.bag))
         self._player = PlayerNode(node, self._bag, self._parameters)
@@ -307,6 +308,7 @@ class Executable:
 
     def run(self) -> int:
         """Play; return the exit code."""
+        self._node.get_logger().info("ready, waiting for subscribers")
         with self._bag:
             report = self._player.run()
         late = ", ".join(f"{name} {value:.2f}" for name, value in (report.schedule or {}).items())

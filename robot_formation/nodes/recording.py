@@ -12,13 +12,11 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
 from rclpy.executors import Executor
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from robot_formation import conversions, exit_codes
+from robot_formation import conversions, exit_codes, names
 from robot_formation.bag.definitions import definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.mcap_file import CHUNK_BYTES
@@ -27,6 +25,7 @@ from robot_formation.bag.recording_queue import QUEUE_BYTES, RecordingQueue
 from robot_formation.bag.selection import Selection
 from robot_formation.bag.writer import WriteOptions
 from robot_formation.nodes.executor import make_executor
+from robot_formation.nodes.intake import Intake
 from robot_formation.nodes.parameter_snapshot import ParameterSnapshot
 from robot_formation.nodes.parameters import HostParameters, ParameterNode, declare
 from robot_formation.nodes.recorder_health import RecorderHealth
@@ -37,6 +36,8 @@ from robot_formation.parameters import ParameterError, parameter
 _DISCOVERY_S = 0.05
 _REVIEW_S = 1.0
 _TICK_TYPE = "std_msgs/msg/UInt32"
+# By their names' last parts: what the bag's recorder makes of true poses, in every formation's namespace.
+_MADE_HERE = {topic.name.lstrip("/"): topic.type for topic in (names.TF, names.TF_STATIC)}
 _AFTER_TICK_S = 0.01  # what belongs to a timestep arrives well within this after its tick
 _IDLE_S = 0.05
 _OLDEST_CHUNK_S = 1.0
@@ -59,6 +60,11 @@ class RecorderParameters:
     images: bool = parameter(
         False, "Record pictures too where 'topics' doesn't name them: noisy frames are 126 MB per thousand"
     )
+    own_namespace: bool = parameter(
+        False,
+        "Record only what lies in the recorder's own namespace or 'topics' names, and of /diagnostics what is said of "
+        "the nodes there",
+    )
     time: str = parameter(
         "simulated",
         "Log times: a message's own stamp or the latest one before it (simulated), or the wall clock (receive)",
@@ -78,13 +84,15 @@ class RecorderParameters:
     )  # fmt: skip
     metadata: tuple[str, ...] = parameter((), "Texts 'key=value' for the bag's metadata record")
 
-    def selection(self, resolve: Callable[[str], str]) -> Selection:
-        """Say which topics are meant; `resolve` makes names absolute.
+    def selection(self, resolve: Callable[[str], str], namespace: str) -> Selection:
+        """Say which topics are meant; `resolve` makes names absolute, `namespace` is the recorder's.
 
         Raises:
             BagError: a regular expression is none.
         """
-        return Selection(tuple(resolve(topic) for topic in self.topics), self.regex, self.exclude, self.images)
+        within = namespace.rstrip("/") if self.own_namespace else ""
+        topics = tuple(resolve(topic) for topic in self.topics)
+        return Selection(topics, self.regex, self.exclude, self.images, within)
 
     def write_options(self) -> WriteOptions:
         """Say how the files are written."""
@@ -98,7 +106,7 @@ class RecorderParameters:
         """
         for text in self.metadata:
             if "=" not in text:
-                raise ParameterError(f"recorder: 'metadata' takes texts like key=value, not '{text}'")
+                raise ParameterError(f"'metadata' takes texts like key=value, not '{text}'")
         return dict(text.split("=", 1) for text in self.metadata)
 
 
@@ -140,17 +148,16 @@ class RecorderNode:
         ask: bool = False,
     ) -> None:
         if not parameters.path:
-            raise ParameterError("recorder: say where the bag goes, with the parameter 'path'")
+            raise ParameterError("say where the bag goes, with the parameter 'path'")
         self._node, self._parameters, self._say = node, parameters, say
         self._warn: Callable[[str], None] = warn or (lambda text: node.get_logger().warning(text))
-        self._selection = parameters.selection(node.resolve_topic_name)
+        self._selection = parameters.selection(node.resolve_topic_name, node.get_namespace())
         self._recorder = Recorder(Path(parameters.path), parameters.texts(), parameters.write_options())
         self._queue = RecordingQueue(self._recorder, parameters.queue_bytes)
         self._receive_time = parameters.time == "receive"
-        self._subscribed: dict[str, QoSProfile] = {}
+        self._subscribed: dict[str, Intake] = {}
         self._ignored: set[str] = set()
         self._refused: set[tuple[int, ...]] = set()
-        self._lost: Counter[str] = Counter()
         self._told_dropped = 0
         self._messages = 0
         self._chunk_at = time.monotonic()
@@ -226,6 +233,11 @@ class RecorderNode:
 
     def _subscribe(self, name: str, types: list[str], infos: list[TopicEndpointInfo]) -> None:
         type_name = types[0]
+        made = _MADE_HERE.get(name.rpartition("/")[2], type_name)
+        if type_name != made:
+            self._ignored.add(name)
+            self._warn(f"{name} is not recorded: its type is {type_name} instead of {made}")
+            return
         try:
             message_class: Any = conversions.message_class(type_name)
             what = definition(type_name)
@@ -239,28 +251,29 @@ class RecorderNode:
             self._warn(f"{name} is published with another version of {type_name}: its definition in the bag won't fit")
         profiles = tuple(offered(info) for info in infos)
         self._queue.call(partial(self._recorder.add_topic, name, type_name, profiles, embedded=what))
-        self._subscribed[name] = accepting(infos)
-        callback = partial(self._on_message, name, type_name)
-        lost = SubscriptionEventCallbacks(message_lost=partial(self._on_lost, name))
-        subscribe = partial(
-            self._node.create_subscription, message_class, name, callback, self._subscribed[name], raw=True
-        )
-        try:
-            subscribe(event_callbacks=lost)
-        except UnsupportedEventTypeError:  # a middleware that can't tell
-            subscribe()
+        take = partial(self._on_message, name, type_name)
+        self._subscribed[name] = Intake(self._node, name, message_class, accepting(infos), len(infos), take)
         self._say(f"recording {name} ({type_name})")
 
     def _on_message(self, topic: str, type_name: str, data: bytes) -> None:
-        if self._health.is_own(topic, data):
+        if self._health.is_own(topic, data) or self._is_of_others(topic, data):
             return
         self._messages += 1
         self._queue.put(topic, type_name, data, time.time_ns() if self._receive_time else None)
         if type_name == _TICK_TYPE:
             self._tick_at = time.monotonic()
 
-    def _on_lost(self, topic: str, info: Any) -> None:
-        self._lost[topic] += info.total_count_change
+    @property
+    def _lost(self) -> Counter[str]:
+        return Counter({topic: intake.lost for topic, intake in self._subscribed.items() if intake.lost})
+
+    def _is_of_others(self, topic: str, data: bytes) -> bool:
+        """Tell whether a message on the one topic that all formations share says nothing of this one's nodes."""
+        namespace = self._selection.namespace
+        if not namespace or topic != names.DIAGNOSTICS.name or topic in self._selection.topics:
+            return False
+        reports = conversions.from_cdr(data, names.DIAGNOSTICS.type).status
+        return not any(report.name.startswith(f"{namespace}/") for report in reports)
 
     def _keep(self, key: str, text: str) -> None:
         self._queue.call(partial(self._recorder.write_metadata, {key: text}))
@@ -269,10 +282,12 @@ class RecorderNode:
         """Tell how it goes, and which publishers the subscriptions made so far don't reach."""
         if self._snapshot is not None:
             self._snapshot.look()
-        for name, profile in self._subscribed.items():
-            for info in self._node.get_publishers_info_by_topic(name):
+        for name, intake in self._subscribed.items():
+            infos = self._node.get_publishers_info_by_topic(name)
+            intake.publishers = len(infos)
+            for info in infos:
                 gid = tuple(info.endpoint_gid)
-                if gid not in self._refused and not accepts(profile, info):
+                if gid not in self._refused and not accepts(intake.qos, info):
                     self._refused.add(gid)
                     self._warn(f"{name} is also published by {info.node_name} with a weaker QoS: that is not recorded")
         dropped = sum(self._queue.dropped.values())
@@ -295,6 +310,7 @@ class Executable:
 
     def run(self) -> int:
         """Record; return the exit code."""
+        self._node.get_logger().info("ready, recording what is published")
         report = self._recorder.run()
         for topic in report.unseen:
             self._node.get_logger().warning(f"nobody has published {topic}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import os
 import signal
 from collections.abc import Iterator
 from types import TracebackType
@@ -17,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from robot_formation.errors import FormationError
 from robot_formation.experiment.shared_memory import TracingFiles
+from robot_formation.loopback import use_loopback
 
 
 @contextlib.contextmanager
@@ -32,6 +34,7 @@ def node_session(name: str, *, namespace: str = "", **options: Any) -> Iterator[
         FormationError: the graph can't be joined (a bad ROS_DOMAIN_ID, a middleware that isn't installed).
     """
     tracing = TracingFiles()
+    use_loopback(os.environ)
     context = Context()
     node = None
     try:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from robot_formation.errors import shown
 from robot_formation.parameters import ParameterError, from_mapping, specs, suggestion
 from robot_formation.surface.base import PLATE_SIZE_M, GradientNormal, Surface
 from robot_formation.surface.bowl import Bowl
@@ -69,14 +70,14 @@ def surface_from_texts(name: str, texts: Sequence[str]) -> Surface:
     for text in texts:
         key, equals, value = text.partition("=")
         if not equals:
-            raise ParameterError(f"surface '{name}': its parameters are texts like 'size_m=2.0', not {text!r}")
+            raise ParameterError(f"surface '{name}': its parameters are texts like 'size_m=2.0', not {shown(text)}")
         if key in known and known[key].type is str:
             values[key] = value
             continue
         try:
             values[key] = float(value)
         except ValueError:
-            raise ParameterError(f"surface '{name}': '{key}' needs a number, not {value!r}") from None
+            raise ParameterError(f"surface '{name}': '{key}' needs a number, not {shown(value)}") from None
     return make_surface(name, values)
 
 

@@ -1,24 +1,28 @@
-"""Pictures and parameters of the detector from files, and pictures with their blocks drawn in."""
+"""Pictures and parameters of the detector from files."""
 
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
-import yaml
+from PIL import Image
 
+from robot_formation.errors import shown
+from robot_formation.files import read_file
 from robot_formation.parameters import ParameterError, from_mapping
-from robot_formation.vision.block import Block
+from robot_formation.png_files import png_head, unpacks_within
 from robot_formation.vision.parameters import SIGNATURES, DetectorParameters
-from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError, scaled
+from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, PictureError, same_shape, scaled
+from robot_formation.yaml_files import read_yaml
 
 CAMERA_PARAMETERS = {
     "camera_brightness",
@@ -29,7 +33,10 @@ CAMERA_PARAMETERS = {
     "min_frames_per_second",
 }
 """What PixyMon offers beside the detector's parameters: it acts on how a picture is taken, in the world's camera."""
-_DRAWN_SCALE = 3
+_FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "PPM", "GIF")
+_MOST_PIXELS = 50_000_000
+_MOST_BYTES = 256 << 20
+_MOST_HEAD_BYTES = 1 << 20
 _STDERR = 2
 _MOST_COMPLAINTS = 4096
 _RANGE = re.compile(rf"signature_([1-{SIGNATURES}])_range")
@@ -39,35 +46,75 @@ def read_picture(path: str | Path, warn: Callable[[str], None]) -> Picture:
     """Read an image file as the camera's picture, shape (208, 316, 3), RGB.
 
     Args:
-        path: any format that OpenCV reads.
+        path: PNG, JPEG, BMP, TIFF, WebP, PNM or GIF, of at most 50 million pixels.
         warn: told in one line each if the image is damaged, or has another size and is scaled.
 
     Raises:
-        PictureError: if the file can't be read or holds no image.
+        PictureError: if the file can't be read, holds no image, or is too large.
     """
     try:
-        content = np.frombuffer(Path(path).read_bytes(), np.uint8)
+        content = read_file(path, _MOST_BYTES)
     except OSError as error:
         raise PictureError(f"{path}: can't be read ({error.strerror}); give an image file") from error
-    image, complaints = _decoded(content)
+    image, complaints = _decoded(content) if _is_small(content, path) else (None, [])
     if image is None:
-        raise PictureError(f"{path}: holds no image that OpenCV can read; give a PNG, JPEG, BMP, TIFF or WebP file")
+        raise PictureError(f"{path}: holds no image that can be read; give a PNG, JPEG, BMP, TIFF or WebP file")
     if complaints:
         warn(f"{path}: damaged, used as far as it can be read ({complaints[0]:.100})")
     height, width = image.shape[:2]
     if (width, height) != (WIDTH, HEIGHT):
-        warn(f"{path}: {width} x {height} pixels, scaled to {WIDTH} x {HEIGHT}")
+        bars = "" if same_shape(image) else ", the rest of it black, since its shape is another"
+        warn(f"{path}: {width} x {height} pixels, scaled to {WIDTH} x {HEIGHT}{bars}")
     return np.ascontiguousarray(scaled(image)[:, :, ::-1])
 
 
-def _decoded(content: npt.NDArray[np.uint8]) -> tuple[Picture | None, list[str]]:
+def _is_small(content: bytes, path: str | Path) -> bool:
+    """Check an image's size by its head, for a small file can claim to be huge; False if it is no image.
+
+    Raises:
+        PictureError: if it has too many pixels.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Pillow warns of sizes too
+        try:
+            with Image.open(io.BytesIO(_head(content)), formats=_FORMATS) as image:
+                width, height = image.size
+        except Image.DecompressionBombError:
+            raise _too_large(path) from None
+        except Exception:  # Pillow's parsers have no common error
+            return False
+    if width * height > _MOST_PIXELS:
+        raise _too_large(path)
+    head = png_head(content)
+    return head is None or unpacks_within(content, head.data_bytes)
+
+
+def _head(content: bytes) -> bytes:
+    """Leave away what Pillow would look through byte by byte for a marker of JPEG."""
+    return content[:_MOST_HEAD_BYTES] if content.startswith(b"\xff\xd8") else content
+
+
+def _too_large(path: str | Path) -> PictureError:
+    return PictureError(f"{path}: has more than {_MOST_PIXELS:,} pixels; scale it down to {WIDTH} x {HEIGHT}")
+
+
+def check_readable(path: str | Path) -> None:
+    """Check that there is a file to read a picture from, before anything else is looked at.
+
+    Raises:
+        PictureError: if there is none.
+    """
+    if not Path(path).is_file():
+        reason = "No such file" if not Path(path).exists() else "it is no file"
+        raise PictureError(f"{path}: can't be read ({reason}); give an image file")
+
+
+def _decoded(content: bytes) -> tuple[Picture | None, list[str]]:
     """Decode an image file's bytes: BGR or None, and what the image libraries complain about."""
-    if not len(content):
-        return None, []
     with tempfile.TemporaryFile() as printed:
         with _standard_error_to(printed.fileno()):
             try:
-                image = cv2.imdecode(content, cv2.IMREAD_COLOR)
+                image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
             except (cv2.error, MemoryError):
                 image = None
         printed.seek(0)
@@ -103,12 +150,7 @@ def read_parameters(path: str | Path, warn: Callable[[str], None]) -> DetectorPa
     Raises:
         ParameterError: if the file can't be read, or a name or value is wrong.
     """
-    try:
-        content = yaml.safe_load(Path(path).read_bytes())
-    except OSError as error:
-        raise ParameterError(f"{path}: can't be read ({error.strerror}); give a YAML or JSON file") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ParameterError(f"{path}: is neither YAML nor JSON ({' '.join(str(error).split())[:120]})") from error
+    content = read_yaml(path, refuse=ParameterError, remedy="give a YAML or JSON file")
     if not isinstance(content, Mapping) or not all(isinstance(name, str) for name in content):
         raise ParameterError(f"{path}: holds no parameters; give lines like 'min_block_area: 20'")
     values = _by_own_names(content, str(path))
@@ -119,12 +161,7 @@ def read_parameters(path: str | Path, warn: Callable[[str], None]) -> DetectorPa
             "the world's camera"
         )
     own = {name: value for name, value in values.items() if name not in CAMERA_PARAMETERS}
-    try:
-        return from_mapping(DetectorParameters, own, where=str(path))
-    except ParameterError:
-        raise
-    except (ValueError, RecursionError) as error:  # a number too long to print, a mapping within itself
-        raise ParameterError(f"{path}: holds a value that can't be used ({error}); correct it") from error
+    return from_mapping(DetectorParameters, own, where=str(path))
 
 
 def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -137,7 +174,7 @@ def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
         known: dict[Any, Any] = ranges if single else values
         key = int(single[1]) if single else name or given
         if key in known:
-            raise ParameterError(f"{where}: '{given}' is given twice; keep one of them")
+            raise ParameterError(f"{where}: {shown(given)} is given twice; keep one of them")
         known[key] = value
     if ranges:
         if "signature_range" in values:
@@ -145,24 +182,3 @@ def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
         default = DetectorParameters().signature_range
         values["signature_range"] = [ranges.get(number + 1, value) for number, value in enumerate(default)]
     return values
-
-
-def write_drawn(path: str | Path, picture: Picture, blocks: Iterable[Block]) -> None:
-    """Write the picture, three times as large, with the blocks' outlines, signatures and indices.
-
-    Raises:
-        PictureError: if the file can't be written.
-    """
-    image = cv2.resize(picture[:, :, ::-1], None, fx=_DRAWN_SCALE, fy=_DRAWN_SCALE, interpolation=cv2.INTER_NEAREST)
-    for block in blocks:
-        left = (block.x - block.width // 2) * _DRAWN_SCALE
-        top = (block.y - block.height // 2) * _DRAWN_SCALE
-        corner = (left + block.width * _DRAWN_SCALE, top + (block.height + 1) * _DRAWN_SCALE)
-        cv2.rectangle(image, (left, top), corner, (255, 255, 255), 1)
-        text = f"s={block.signature:o} i={block.index}"
-        cv2.putText(image, text, (left, max(top - 4, 12)), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (255, 255, 255), 1)
-    content = cv2.imencode(".png", image)[1]
-    try:
-        Path(path).write_bytes(content.tobytes())
-    except OSError as error:
-        raise PictureError(f"{path}: can't be written ({error.strerror}); choose another folder") from error

@@ -68,6 +68,14 @@ class ImperfectCalibration(Calibration):
     plane_m: float = parameter(0.1, "height of that plane", unit="m", low=-10.0, high=10.0)
 
 
+def _undistorted(points: Array, matrix: Array, distortion: Array) -> Array:
+    """Directions (n, 1, 2) of pixels (n, 1, 2), iterated until they stand still."""
+    if hasattr(cv2, "undistortPointsIter"):  # OpenCV 4, whose undistortPoints ends after five rounds up to 4.6
+        unturned = np.eye(3)
+        return np.asarray(cv2.undistortPointsIter(points, matrix, distortion, unturned, unturned, _UNDISTORT_STOP))
+    return np.asarray(cv2.undistortPoints(points, matrix, distortion, criteria=_UNDISTORT_STOP))
+
+
 class Locator:
     """Gives the place in the world of a reference dot seen at a pixel."""
 
@@ -86,7 +94,7 @@ class Locator:
         if len(pixels) == 0:
             return np.empty((0, 3))
         points = np.asarray(pixels, float).reshape(-1, 1, 2)
-        rays = cv2.undistortPoints(points, self._matrix, self._distortion, criteria=_UNDISTORT_STOP).reshape(-1, 2)
+        rays = _undistorted(points, self._matrix, self._distortion).reshape(-1, 2)
         return np.array([self._meet(float(x), -float(y)) for x, y in rays])
 
     def place_of(self, x_m: float, y_m: float) -> Array:

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import yaml
 
-from robot_formation.errors import FormationError
+from robot_formation.errors import FormationError, shown
 from robot_formation.vision.parameters import SIGNATURES
 from robot_formation.vision.picture import HEIGHT, WIDTH, checked
 from robot_formation.vision.teaching import BLOCK, IntArray, Point, TeachFrame, bounds, grow, packed
+from robot_formation.yaml_files import read_yaml
 
 _FILE_NAMES = {
     "sig": "sig",
@@ -69,11 +70,11 @@ class Signature:
             SignatureError: if a value is outside what the camera can store.
         """
         if not 1 <= self.sig <= SIGNATURES:
-            raise SignatureError(f"signature {self.sig} does not exist; use a number from 1 to {SIGNATURES}")
+            raise SignatureError(f"signature {shown(self.sig)} does not exist; use a number from 1 to {SIGNATURES}")
         if self.type not in (0, 1):
-            raise SignatureError(f"signature {self.sig} has type {self.type}; use 0 (normal) or 1 (colour code)")
+            raise SignatureError(f"signature {self.sig} has type {shown(self.type)}; use 0 (normal) or 1 (colour code)")
         if not 0 <= self.rgb <= 0xFFFFFF:
-            raise SignatureError(f"signature {self.sig} has rgb {self.rgb}; use a number from 0 to {0xFFFFFF}")
+            raise SignatureError(f"signature {self.sig} has rgb {shown(self.rgb)}; use a number from 0 to {0xFFFFFF}")
         chroma = (self.u_min, self.u_max, self.u_mean, self.v_min, self.v_max, self.v_mean)
         if not all(-_BOUND <= value < _BOUND for value in chroma):
             raise SignatureError(f"signature {self.sig} has a bound of more than 32 bits; teach it again")
@@ -91,15 +92,15 @@ class Signature:
         """
         if not isinstance(values, Mapping):
             raise SignatureError(
-                f"{where}: a signature must be a mapping with sig, uMin, uMax, ..., not {values!r:.60}"
+                f"{where}: a signature must be a mapping with sig, uMin, uMax, ..., not {shown(values)}"
             )
         for stored, value in values.items():
             if stored not in _FILE_NAMES.values():
                 raise SignatureError(
-                    f"{where}: a signature has no '{stored}'; there are {', '.join(_FILE_NAMES.values())}"
+                    f"{where}: a signature has no {shown(stored)}; there are {', '.join(_FILE_NAMES.values())}"
                 )
             if isinstance(value, bool) or not isinstance(value, int):
-                raise SignatureError(f"{where}: '{stored}' of a signature must be an integer, not {value!r:.60}")
+                raise SignatureError(f"{where}: '{stored}' of a signature must be an integer, not {shown(value)}")
         missing = [s for n, s in _FILE_NAMES.items() if s not in values and n not in _OPTIONAL]
         if missing:
             raise SignatureError(f"{where}: a signature lacks {', '.join(missing)}; teach it again")
@@ -173,22 +174,11 @@ def load_signatures(path: str | Path) -> list[Signature]:
     Raises:
         SignatureError: if the file can't be read, holds no signatures, or one is wrong or doubled.
     """
-    try:
-        content = yaml.safe_load(Path(path).read_bytes())
-    except OSError as error:
-        raise SignatureError(f"{path}: can't be read ({error.strerror}); teach one with 'formation teach'") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split())[:120]
-        raise SignatureError(f"{path}: is neither YAML nor JSON ({reason})") from error
+    content = read_yaml(path, refuse=SignatureError, remedy="teach one with 'formation teach'")
     listed = content.get("signatures") if isinstance(content, Mapping) else None
     if not isinstance(listed, list) or not listed:
         raise SignatureError(f"{path}: holds no signatures (a list 'signatures'); make one with 'formation teach'")
-    try:
-        signatures = [Signature.from_mapping(item, where=str(path)) for item in listed]
-    except SignatureError:
-        raise
-    except ValueError as error:  # a number too long to print
-        raise SignatureError(f"{path}: holds a number that can't be used ({error}); teach it again") from error
+    signatures = [Signature.from_mapping(item, where=str(path)) for item in listed]
     try:
         return sorted_unique(signatures)
     except SignatureError as error:

@@ -152,7 +152,7 @@ class FormationParameters:
 class PredictorParameters:
     """Which predictor runs, and the parameters of all."""
 
-    name: str = parameter("measured", "Predictor", choices=NAMES)
+    name: str = parameter("formation", "Predictor", choices=NAMES)
     forgetting: float = parameter(
         1.0, "Weight of a pair relative to the next newer one ('measured'); 1 forgets nothing", low=0.01, high=1.0
     )

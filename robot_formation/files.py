@@ -1,0 +1,75 @@
+"""Opening files that somebody else named: regular files of a bounded size only.
+
+A named pipe would be waited for without end, and a device such as /dev/zero has none.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+MOST_RECORD_BYTES = 16 << 20
+"""Size of the largest file that this project itself writes beside bags and tables."""
+
+_KINDS = (
+    (stat.S_ISDIR, errno.EISDIR, "Is a directory"),
+    (stat.S_ISFIFO, errno.EINVAL, "Is a named pipe, not a file"),
+    (stat.S_ISCHR, errno.EINVAL, "Is a device, not a file"),
+    (stat.S_ISBLK, errno.EINVAL, "Is a device, not a file"),
+    (stat.S_ISSOCK, errno.EINVAL, "Is a socket, not a file"),
+)
+
+
+def open_file(path: str | Path) -> BinaryIO:
+    """Open a regular file for reading, in binary form.
+
+    Raises:
+        OSError: if it can't be opened, or is a directory, a named pipe, a device or a socket.
+    """
+    try:
+        # A named pipe without a writer would block here.
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    except ValueError as error:  # a NUL in its name
+        raise OSError(errno.EINVAL, "No such file", str(path)) from error
+    try:
+        mode = os.fstat(descriptor).st_mode
+        for is_kind, number, text in _KINDS:
+            if is_kind(mode):
+                raise OSError(number, text, str(path))
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def check_file(path: str | Path) -> None:
+    """Check what a library is about to open by name.
+
+    Raises:
+        OSError: as for `open_file`.
+    """
+    open_file(path).close()
+
+
+def read_file(path: str | Path, most_bytes: int) -> bytes:
+    """Read a regular file whole.
+
+    Raises:
+        OSError: as for `open_file`, or if the file is larger than `most_bytes`.
+    """
+    with open_file(path) as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise OSError(errno.EFBIG, f"File is larger than {size_text(most_bytes)}", str(path))
+    return content
+
+
+def size_text(size_bytes: int) -> str:
+    """Write a number of bytes for people."""
+    for unit, size in (("GiB", 2**30), ("MiB", 2**20), ("KiB", 2**10)):
+        if size_bytes >= size:
+            return f"{size_bytes / size:.1f} {unit}"
+    return f"{size_bytes} B"

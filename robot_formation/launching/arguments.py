@@ -1,0 +1,143 @@
+"""The arguments of launch/formation.launch.py, and what they mean; without launch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from robot_formation.errors import FormationError
+from robot_formation.experiment import scenario as scenarios
+from robot_formation.experiment.scenario import Scenario
+from robot_formation.loopback import PROFILES, RANGE, use_loopback
+from robot_formation.paths import config_dir
+
+_SWITCH = ("true", "false", "True", "False", "1", "0")
+_OPENING, _CLOSING = "[{", "]}"
+_BEFORE_QUOTE = "=[{,: "
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A launch argument: default, description, and its values where only some are allowed."""
+
+    default: str
+    description: str
+    choices: tuple[str, ...] | None = None
+
+
+ARGUMENTS = {
+    "track": Argument("two", "preset track: see 'formation list tracks'"),
+    "scenario": Argument("", "scenario file, instead of a track"),
+    "surface": Argument("", "surface: see 'formation list surfaces'; empty: the scenario's"),
+    "predictor": Argument("", "predictor: see 'formation list predictors'; empty: the scenario's"),
+    "seed": Argument("", "seed of every random stream; empty: the scenario's"),
+    "camera": Argument("", "stream or on_demand; empty: the scenario's", ("", "stream", "on_demand")),
+    "real_time_factor": Argument("", "0: as fast as possible, 1: real time; empty: the scenario's"),
+    "set": Argument("", "further settings, separated by spaces, like 'predictor.forgetting=0.95 followers=2'"),
+    "namespace": Argument("", "namespace of the formation, below the one that was pushed; empty: none of its own"),
+    "bag": Argument("", "folder of the bag, which must not exist; empty: nothing is recorded"),
+    "images": Argument("false", "record pictures too", _SWITCH),
+    "rviz": Argument("false", "show the run in RViz, which must be installed; closing it doesn't end the run", _SWITCH),
+    "discovery_range": Argument(
+        "",
+        f"who may find the nodes; empty: what {RANGE} says, else LOCALHOST",
+        ("", "LOCALHOST", "SUBNET", "OFF", "SYSTEM_DEFAULT"),
+    ),
+}
+
+
+def scenario_of(values: Mapping[str, str]) -> Scenario:
+    """Put the scenario together that the arguments describe.
+
+    Raises:
+        FormationError: naming the argument that is wrong.
+    """
+    file = values["scenario"]
+    scenario = scenarios.load(Path(file)) if file else scenarios.load_track(values["track"])
+    if values["surface"]:
+        scenario = scenarios.with_surface(scenario, values["surface"])
+    for name, key in (
+        ("predictor", "predictor.name"),
+        ("seed", "seed"),
+        ("camera", "world.camera.mode"),
+        ("real_time_factor", "world.real_time_factor"),
+    ):
+        if values[name]:
+            scenario = scenarios.with_option(scenario, key, values[name], f"{name}:=")
+    scenario = scenarios.override(scenario, split_settings(values["set"]), source="set")
+    scenario.check()
+    return scenario
+
+
+def split_settings(text: str) -> list[str]:
+    """Split settings at spaces, but not inside brackets or quotes: 'world.robots=[a, b] seed=3' holds two.
+
+    Raises:
+        FormationError: a bracket or a quote is not closed.
+    """
+    found, begin, depth, quote = [], 0, 0, ""
+    for place, sign in enumerate(text):
+        if quote:
+            quote = "" if sign == quote else quote
+        elif sign in "'\"" and (place == 0 or text[place - 1] in _BEFORE_QUOTE):
+            quote = sign
+        elif sign in _OPENING:
+            depth += 1
+        elif sign in _CLOSING:
+            depth -= 1
+        elif sign.isspace() and depth == 0:
+            found.append(text[begin:place])
+            begin = place + 1
+    if depth or quote:
+        raise FormationError(f"set: {text}: a {'quote' if quote else 'bracket'} has no partner")
+    return [setting for setting in [*found, text[begin:]] if setting]
+
+
+def is_true(text: str) -> bool:
+    """Read a switch as other launch files do."""
+    return text.lower() in ("true", "1")
+
+
+def discovery(argument: str, environment: Mapping[str, str]) -> dict[str, str]:
+    """Tell which variables the nodes need so that those find them who should: the argument, else what is exported."""
+    wanted = argument or ("" if environment.get(RANGE) else "LOCALHOST")
+    return {RANGE: wanted} if wanted else {}
+
+
+def viewer_environment(given: Mapping[str, str], exported: Mapping[str, str]) -> dict[str, str]:
+    """Tell which variables a viewer needs; our nodes bind themselves to the loopback interface, it can't.
+
+    Args:
+        given: what the nodes are given.
+        exported: what is inherited.
+    """
+    whole = {**exported, **given}
+    use_loopback(whole)
+    return {name: whole[name] for name in (RANGE, *PROFILES) if name in whole}
+
+
+def rviz_config() -> Path:
+    """Name the file of the viewer's displays."""
+    return config_dir() / "formation.rviz"
+
+
+def rviz_remappings(namespace: str) -> list[tuple[str, str]]:
+    """List what the viewer has to remap for a formation in a namespace ('' or absolute)."""
+    if not namespace.strip("/"):
+        return []
+    displays = yaml.safe_load(rviz_config().read_text(encoding="utf-8"))["Visualization Manager"]["Displays"]
+    topics = dict.fromkeys(["/tf", "/tf_static", "/clock", *_topics(displays)])
+    return [(topic, f"{namespace.rstrip('/')}{topic}") for topic in topics]
+
+
+def _topics(displays: Any) -> Iterator[str]:
+    """Find the topics in RViz's displays: the values of 'Topic' and 'Description Topic'."""
+    for display in displays:
+        for entry in ("Topic", "Description Topic"):
+            topic = display.get(entry)
+            if isinstance(topic, dict) and topic.get("Value"):
+                yield topic["Value"]

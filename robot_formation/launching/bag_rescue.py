@@ -1,0 +1,62 @@
+"""Looks after a run's bag when its recorder has ended: rescues one that was cut off, and says what is missing."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections import Counter
+from pathlib import Path
+
+from robot_formation.bag.errors import BagError
+from robot_formation.bag.place import CUT_OFF_SUFFIX, PARTIAL_SUFFIX
+from robot_formation.bag.reader import read_bag
+from robot_formation.bag.recorder import METADATA_NAME
+from robot_formation.bag.recover import recover
+
+_MOST_TOPICS = 5
+
+
+def rescue(bag: Path) -> tuple[Path | None, str]:
+    """Finish a bag that its recorder could not finish.
+
+    Returns:
+        The bag, None if there is none; and what went wrong, if anything did.
+    """
+    if bag.exists():
+        return bag, ""
+    partial = bag.with_name(bag.name + PARTIAL_SUFFIX)
+    if not partial.exists():
+        return None, ""
+    cut_off = bag.with_name(bag.name + CUT_OFF_SUFFIX)
+    try:
+        partial.rename(cut_off)  # the whole bag is written under the partial one's name first
+        try:
+            report = recover(cut_off, bag)
+        except BagError:
+            cut_off.rename(partial)  # where the recorder said it is, for a later try
+            raise
+        if report.damaged_chunks == 0:  # what else is missing had not been written: nothing more to get out of it
+            shutil.rmtree(cut_off)
+    except OSError as error:
+        return None, f"{partial} can't be completed: {error.strerror or error}"
+    except BagError as error:
+        return None, str(error).replace(str(cut_off), str(partial))
+    return bag, ""
+
+
+def missing_messages(bag: Path) -> str:
+    """Say in a line which messages the bag's recorder knows it didn't get; nothing if there are none.
+
+    Raises:
+        BagError: the bag can't be read.
+    """
+    with read_bag(bag, allow_empty=True) as opened:
+        details = opened.metadata(METADATA_NAME)
+    counts: Counter[str] = Counter()
+    for key in ("dropped", "lost"):
+        counts.update(json.loads(details.get(key, "{}")))
+    if not counts:
+        return ""
+    topics = [f"{topic} ({count})" for topic, count in counts.most_common(_MOST_TOPICS)]
+    more = f" and {len(counts) - _MOST_TOPICS} more topics" if len(counts) > _MOST_TOPICS else ""
+    return f"the bag lacks {counts.total()} messages that were lost on the way: {', '.join(topics)}{more}"

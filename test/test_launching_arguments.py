@@ -1,0 +1,59 @@
+"""The launch file's arguments: settings in one text, complaints by their names."""
+
+import pytest
+
+from robot_formation.errors import FormationError
+from robot_formation.launching.arguments import ARGUMENTS, scenario_of, split_settings
+
+
+def scenario(**values):
+    return scenario_of({name: argument.default for name, argument in ARGUMENTS.items()} | values)
+
+
+@pytest.mark.parametrize(
+    ("text", "settings"),
+    [
+        ("", []),
+        ("  seed=3   followers=2 ", ["seed=3", "followers=2"]),
+        (
+            "world.surface_parameters=[file=hills.png, scale_m=0.2] followers=2",
+            ["world.surface_parameters=[file=hills.png, scale_m=0.2]", "followers=2"],
+        ),
+        ("name='my run' seed=3", ["name='my run'", "seed=3"]),
+        ('leader={timesteps: 4, followers: ["a b"]} seed=3', ['leader={timesteps: 4, followers: ["a b"]}', "seed=3"]),
+        ("name=don't seed=3", ["name=don't", "seed=3"]),
+        ("drive.calibration.v=[0.0, 33] seed=3", ["drive.calibration.v=[0.0, 33]", "seed=3"]),
+    ],
+)
+def test_settings_are_split_at_spaces_outside_lists_and_quotes(text, settings):
+    assert split_settings(text) == settings
+
+
+@pytest.mark.parametrize("text", ["seed=[3", "seed=3]", "name='my run"])
+def test_what_is_not_closed_is_said(text):
+    with pytest.raises(FormationError, match="has no partner"):
+        split_settings(text)
+
+
+def test_a_list_with_spaces_arrives_in_the_scenario():
+    settings = "world.surface_parameters=[slope_deg=2, direction_deg=0] followers=2"
+    found = scenario(track="one", surface="inclined_plane", set=settings)
+    assert found.parameters("world")["surface_parameters"] == ["slope_deg=2", "direction_deg=0"]
+    assert found.setup.followers == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("predictor", "foo", "predictor:= can't be 'foo'"),
+        ("seed", "x", "seed:="),
+        ("real_time_factor", "fast", "real_time_factor:="),
+        ("set", "nosuch.x=1", "set: no node 'nosuch'"),
+        ("track", "tow", "did you mean 'two'"),
+    ],
+)
+def test_a_complaint_names_the_argument(name, value, says):
+    with pytest.raises(FormationError) as error:
+        scenario(**{name: value})
+    assert says in str(error.value)
+    assert "--set" not in str(error.value)

@@ -1,0 +1,70 @@
+"""What becomes of a run's bag when its recorder could not finish it."""
+
+import json
+import os
+
+import pytest
+from synthetic_bag import STORE, text
+
+from robot_formation.bag.errors import BagError
+from robot_formation.bag.place import recover_hint
+from robot_formation.bag.qos import TopicQos
+from robot_formation.bag.reader import read_bag
+from robot_formation.bag.recorder import METADATA_NAME
+from robot_formation.bag.recover import recover
+from robot_formation.bag.writer import BagWriter
+from robot_formation.launching import bag_rescue
+from robot_formation.launching.bag_rescue import missing_messages, rescue
+
+STRING = "std_msgs/msg/String"
+
+
+def write(path, **metadata):
+    with BagWriter(path) as writer:
+        writer.add_topic("/words", STRING, TopicQos())
+        writer.write("/words", bytes(STORE.serialize_cdr(text("hello"), STRING)), 5)
+        if metadata:
+            writer.write_metadata(METADATA_NAME, {key: json.dumps(value) for key, value in metadata.items()})
+    return path
+
+
+@pytest.fixture
+def cut_off(tmp_path):
+    """A bag that was never renamed to its name, which is returned."""
+    write(tmp_path / "bag").rename(tmp_path / "bag.partial")
+    return tmp_path / "bag"
+
+
+def test_a_bag_that_was_cut_off_is_completed_under_its_name(cut_off):
+    assert rescue(cut_off) == (cut_off, "")
+    assert os.listdir(cut_off.parent) == ["bag"]
+    with read_bag(cut_off) as bag:
+        assert bag.message_count == 1
+
+
+def test_where_that_fails_it_stays_where_the_recorder_said_and_the_command_works(cut_off, monkeypatch):
+    def refuse(source, out):
+        raise BagError(f"{source}: no space left{recover_hint(source)}")
+
+    monkeypatch.setattr(bag_rescue, "recover", refuse)
+    bag, problem = rescue(cut_off)
+    assert bag is None
+    partial = cut_off.with_name("bag.partial")
+    assert f"'formation recover {partial}'" in problem
+    assert os.listdir(cut_off.parent) == ["bag.partial"]
+    assert recover(partial, cut_off).messages == 1
+
+
+def test_no_bag_at_all_is_none(tmp_path):
+    assert rescue(tmp_path / "bag") == (None, "")
+
+
+def test_messages_that_were_lost_are_said_in_one_line(tmp_path):
+    bag = write(tmp_path / "bag", lost={"/clock": 1, "/path": 3}, dropped={"/path": 2})
+    assert missing_messages(bag) == "the bag lacks 6 messages that were lost on the way: /path (5), /clock (1)"
+    many = write(tmp_path / "many", lost={f"/topic_{number}": 1 for number in range(7)})
+    assert missing_messages(many).endswith(" and 2 more topics")
+
+
+def test_a_whole_bag_lacks_nothing(tmp_path):
+    assert missing_messages(write(tmp_path / "bag")) == ""

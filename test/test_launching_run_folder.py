@@ -1,0 +1,67 @@
+"""A run's temporary folder: gone with the run, and that of a killed launcher with the next one."""
+
+import os
+import subprocess
+import sys
+
+from robot_formation.launching import run_folder as folders
+from robot_formation.launching.run_folder import remove_orphans, run_folder
+
+OWNER = """
+import sys
+from pathlib import Path
+from robot_formation.launching.run_folder import run_folder
+with run_folder(Path(sys.argv[1])) as folder:
+    (folder / "world.log").write_text("words")
+    print(folder, flush=True)
+    sys.stdin.read()
+"""
+
+
+def start_owner(parent):
+    process = subprocess.Popen(
+        [sys.executable, "-c", OWNER, str(parent)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    return process, parent / process.stdout.readline().strip()
+
+
+def test_the_folder_is_gone_at_the_end(tmp_path):
+    with run_folder(tmp_path) as folder:
+        assert folder.is_dir()
+        assert folder.parent == tmp_path
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_next_run_removes_what_a_killed_one_left_and_never_a_living_ones(tmp_path):
+    killed, left = start_owner(tmp_path)
+    living, kept = start_owner(tmp_path)
+    with killed, living:
+        try:
+            assert remove_orphans(tmp_path) == []
+            killed.kill()
+            killed.wait()
+            assert (left / "world.log").exists()
+            with run_folder(tmp_path):
+                assert not left.exists()
+                assert (kept / "world.log").exists()
+        finally:
+            killed.kill()
+            living.kill()
+
+
+def test_a_folder_that_is_just_being_made_is_left_alone(tmp_path):
+    fresh, old = tmp_path / f"{folders.PREFIX}fresh", tmp_path / f"{folders.PREFIX}old"
+    fresh.mkdir()
+    old.mkdir()
+    os.utime(old, (0, 0))
+    assert remove_orphans(tmp_path) == [old]
+    assert fresh.exists()
+
+
+def test_links_and_other_folders_stay(tmp_path):
+    target = tmp_path / "precious"
+    target.mkdir()
+    os.utime(target, (0, 0))
+    (tmp_path / f"{folders.PREFIX}link").symlink_to(target)
+    assert remove_orphans(tmp_path) == []
+    assert target.exists()
