@@ -167,11 +167,11 @@ def test_the_forecast_is_that_of_the_model_plus_the_filtered_residual():
 # --- the mixture ----------------------------------------------------------------------------------------------------
 
 
-def test_the_mixture_weighs_by_discounted_squared_errors_with_a_handicap():
+def test_the_mixture_weighs_by_discounted_squared_errors_with_an_initial_loss():
     parameters = PredictorParameters()
     p = parameters.formation
     tested, models = Mixture(parameters), None
-    losses = np.array([[0.0, 0.0], [p.handicap, p.handicap]])
+    losses = np.array([[0.0, 0.0], [p.initial_loss, p.initial_loss]])
     scale = np.array([p.scale_u_m, p.scale_v_m])
     for x, _, _ in timesteps(25):
         seen = x + 0.002

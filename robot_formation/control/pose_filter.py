@@ -86,13 +86,13 @@ class FilterParameters:
         low=0.0,
         high=1.0,
     )
-    calm_misfit: float = parameter(
+    calm_nis: float = parameter(
         0.12,
         "Mean NIS of the first look after a step up to which the noise of the step model is not inflated",
         low=1e-4,
         high=100.0,
     )
-    slip_per_lean: float = parameter(
+    slip_per_tilt: float = parameter(
         0.76,
         "Sideways slip of a driving robot: share of its way per radian of lateral slope",
         unit="1/rad",
@@ -205,9 +205,9 @@ class PoseFilter:
         """
         p = self._p
         overshoot = max(0.0, overshoot)
-        slip = p.slip_per_lean + p.slip_growth * overshoot**2
+        slip = p.slip_per_tilt + p.slip_growth * overshoot**2
         # What the ground does to a step is a model of the default world; where it fails, it counts for less.
-        inflation = min(_MOST_INFLATION, max(1.0, self._nis / p.calm_misfit))
+        inflation = min(_MOST_INFLATION, max(1.0, self._nis / p.calm_nis))
         sidestep = p.neighbour_sidestep_sigma_m * inflation if sidestep_sigma_m is None else sidestep_sigma_m
         self._stepped = True
         for hypothesis in self.hypotheses:

@@ -26,7 +26,7 @@ class Mixture:
         self._models: dict[str, Model] = {"persistence": Previous(parameters), "koopman": self._koopman}
         self._scale = np.array([p.scale_u_m, p.scale_v_m])
         # Half squared errors in units of the scale: persistence is believed first.
-        self._losses: Matrix = np.array([[0.0, 0.0], [p.handicap, p.handicap]])
+        self._losses: Matrix = np.array([[0.0, 0.0], [p.initial_loss, p.initial_loss]])
         self._begun = False
 
     def judge(self, w: Vector) -> None:
