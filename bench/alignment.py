@@ -61,7 +61,7 @@ def run(args):
     done = {(row.mode, row.seed) for row in rows}
     sample = stratified(faces, args.starts, args.seed)
     tasks = [(mode, start, seed) for start, seed in sample for mode in modes if (mode, seed) not in done]
-    pool = Parallel(n_jobs=args.jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="3*n_jobs")
+    pool = Parallel(n_jobs=args.jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
     jobs = (delayed(run_start)(made[mode], mode, start, faces[start], seed) for mode, start, seed in tasks)
     for row in with_progress(pool(jobs), len(tasks)):
         write_rows(args.out, [row])

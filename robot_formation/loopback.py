@@ -13,6 +13,16 @@ PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 _BEYOND = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")
 
 
+def stay_here(environment: MutableMapping[str, str]) -> None:
+    """Change a process's environment so that it finds nodes on this machine only, unless it says something else.
+
+    It must be called before the process joins the graph for the first time.
+    """
+    if not any(environment.get(name) for name in (RANGE, "ROS_LOCALHOST_ONLY", *_BEYOND)):
+        environment[RANGE] = "LOCALHOST"
+    use_loopback(environment)
+
+
 def use_loopback(environment: MutableMapping[str, str]) -> None:
     """Change a process's environment so that Fast DDS opens sockets on the loopback interface only.
 

@@ -136,7 +136,8 @@ def test_a_picture_that_cannot_be_written_is_told(bag, tmp_path):
 def test_analysing_without_pictures_imports_neither_matplotlib_nor_ros(bag):
     program = (
         "import argparse, pathlib, sys; from robot_formation.cli import analyze; "
-        f"analyze.run(argparse.Namespace(bag=pathlib.Path({str(bag)!r}), out=None, json=True, no_pictures=True)); "
+        f"options = dict(bag=pathlib.Path({str(bag)!r}), out=None, json=True, no_pictures=True, namespace=None); "
+        "analyze.run(argparse.Namespace(**options)); "
         "print([m for m in ('matplotlib', 'rclpy', 'geometry_msgs', 'pybullet') if m in sys.modules], file=sys.stderr)"
     )
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -67,7 +67,8 @@ def test_of_several_formations_one_has_to_be_chosen(moved_to, capsys):
     for arguments in (["replay", bag], ["predict", "--bag", bag]):
         assert "choose one by --namespace" in complaint(capsys, *arguments)
     chosen = printed(capsys, "analyze", bag, "--namespace", "site_a", "--json")
-    assert chosen == printed(capsys, "analyze", SAMPLE, "--json")
+    assert chosen.pop("bag") == str(bag)
+    assert chosen.items() <= printed(capsys, "analyze", SAMPLE, "--json").items()
     assert printed(capsys, "replay", bag, "--namespace", "/deep/site_b", "--json")["followers"]
     assert printed(capsys, "predict", "--bag", bag, "--namespace", "/site_a", "--predictor", "previous", "--json")
 

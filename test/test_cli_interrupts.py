@@ -133,7 +133,9 @@ def test_an_interrupted_sweep_says_so_in_one_line_and_leaves_no_worker(tmp_path)
     assert (process.returncode, printed) == (130, "")
     *progress, last = errors.strip().splitlines()
     assert last == f"formation sweep: interrupted; the same command with --out {out} goes on"
-    assert all("per minute" in line for line in progress if line)
+    seeds, *runs = [line for line in progress if line]
+    assert seeds == "seeds 0 to 39 (40 seeds)"
+    assert all("per minute" in line for line in runs)
     assert workers
     end = time.monotonic() + 60.0
     while any(map(alive, workers)):

@@ -44,7 +44,8 @@ def call(capsys, *arguments):
 def complaint(capsys, *arguments):
     code, said = call(capsys, *arguments)
     assert (code, said.out) == (2, "")
-    (line,) = said.err.strip().splitlines()
+    *conditions, line = said.err.strip().splitlines()
+    assert all("seed" in text for text in conditions)
     assert line.startswith("formation sweep: ")
     return line
 
@@ -103,7 +104,8 @@ def test_without_out_a_new_folder_in_bags_is_made_each_time(capsys, tmp_path, ma
         assert call(capsys, *CHOICE, "--jobs", 1)[0] == 0
     names = ["sweep_20260101-120000", "sweep_20260101-120000_2", "sweep_20260101-120000_3"]
     assert sorted(path.name for path in (tmp_path / "bags").iterdir()) == names
-    assert default_folder().path.name == "sweep_20260101-120000_4"
+    with default_folder() as place:
+        assert place.path.name == "sweep_20260101-120000_4"
     assert len(made) == 18
 
 

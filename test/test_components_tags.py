@@ -11,7 +11,7 @@ from robot_formation.control.alignment import FRONT, REAR, TARGET, bounding_boxe
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import load, load_track, node_defaults, override
-from robot_formation.parameters import ParameterError, from_mapping
+from robot_formation.parameters import ParameterError, flatten, from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
 from robot_formation.tags import Face
@@ -162,7 +162,7 @@ def test_a_run_of_pictures_gives_the_same_blocks_twice(bench):
 
 def changed(component, **values):
     defaults = {**node_defaults("block_detector"), "block_filtering": 0}
-    component.set_parameters(from_mapping(BlockDetectorNodeParameters, {**defaults, **values}, where="test"))
+    component.set_parameters(from_mapping(BlockDetectorNodeParameters, {**defaults, **flatten(values)}, where="test"))
 
 
 @needs_tags

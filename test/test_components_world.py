@@ -42,12 +42,12 @@ def of(sent, topic):
 def test_the_start_shows_the_ground_the_cameras_the_clock_and_every_robot(wire):
     topics = [topic for topic, _ in wire.sent]
     assert topics[:2] == ["surface", "follower_1/camera/camera_info"]
-    assert {"/clock", "leader/robot_description", "follower_1/robot_description"} <= set(topics)
+    assert {"clock", "leader/robot_description", "follower_1/robot_description"} <= set(topics)
     for robot in ("leader", "follower_1"):
         assert {f"ground_truth/{robot}/{what}" for what in ("odom", "pose", "path")} <= set(topics)
     (info,) = of(wire.sent, "follower_1/camera/camera_info")
     assert (info.width, info.height, info.k[0]) == (316, 208, 273.7)
-    assert conversions.to_ns(of(wire.sent, "/clock")[0].clock) == 0
+    assert conversions.to_ns(of(wire.sent, "clock")[0].clock) == 0
     assert not wire.component.busy
 
 
@@ -60,7 +60,7 @@ def test_a_command_moves_the_robot_until_it_rests_and_the_last_joint_states_say_
     assert not any(states[-1].velocity)
     positions, _ = conversions.read_joint_states(states[-1])
     assert positions[:4] == pytest.approx([1.0] * 4, abs=0.5)
-    stamps = [conversions.to_ns(message.clock) for message in of(sent, "/clock")]
+    stamps = [conversions.to_ns(message.clock) for message in of(sent, "clock")]
     assert stamps == sorted(set(stamps))
     assert stamps[-1] == conversions.stamp_of(states[-1]) == wire.component.stamp_ns
     assert not of(sent, "leader/joint_states")

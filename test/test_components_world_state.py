@@ -109,7 +109,7 @@ def test_a_reset_says_again_what_a_late_joiner_needs_and_time_never_goes_back():
         assert len(used.of(topic)) == 2
     assert len(used.of("ground_truth/leader/path")[-1].poses) == 1
     used.stranger()
-    clock = [conversions.to_ns(message.clock) for message in used.of("/clock")]
+    clock = [conversions.to_ns(message.clock) for message in used.of("clock")]
     assert clock == sorted(clock)
 
 

@@ -8,7 +8,7 @@ import pytest
 from graph_lab import DEADLINE_S
 
 from robot_formation import loopback, names
-from robot_formation.loopback import PROFILES, RANGE, use_loopback
+from robot_formation.loopback import PROFILES, RANGE, stay_here, use_loopback
 from robot_formation.paths import config_dir
 
 PROFILE = str(config_dir() / "loopback.xml")
@@ -118,3 +118,20 @@ def test_without_the_profile_ros_limits_discovery_itself(monkeypatch, tmp_path):
     environment = {RANGE: "LOCALHOST"}
     use_loopback(environment)
     assert environment == {RANGE: "LOCALHOST"}
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, "SYSTEM_DEFAULT"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "SUBNET"),
+        ({"ROS_STATIC_PEERS": "10.0.0.2"}, None),
+        ({"ROS_DISCOVERY_SERVER": "10.0.0.2:11811"}, None),
+        ({"ROS_LOCALHOST_ONLY": "1"}, None),
+    ],
+)
+def test_verbs_stay_on_this_machine_unless_the_user_asks_otherwise(given, expected):
+    environment = dict(given)
+    stay_here(environment)
+    assert environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == expected
+    assert (expected == "SYSTEM_DEFAULT") == any(name in environment for name in PROFILES)

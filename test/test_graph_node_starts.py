@@ -36,7 +36,11 @@ def test_help_tells_purpose_usage_topics_and_every_parameter(name):
 
 @pytest.mark.parametrize(
     ("name", "parameter"),
-    [("recorder", "regex (string, '')"), ("player", "regex (string, '')"), ("progress", "followers (integer, 1)")],
+    [
+        ("recorder", "regex (string, '')"),
+        ("player", "regex (string, '')"),
+        ("progress", "followers (integer, 1; 1 to 9)"),
+    ],
 )
 def test_help_of_the_nodes_for_bags_and_launched_runs(name, parameter):
     done = node(name, "-h")

@@ -88,6 +88,7 @@ def test_every_requirement_has_a_rosdep_key_that_brings_it(package_xml, setup_ar
     brings = {
         "mcap-ros2-support": {"mcap", "zstandard"},
         "python3-opencv": {"opencv-python-headless"},
+        "python3-pil": {"pillow"},
         "python3-yaml": {"PyYAML"},
         **{f"python3-{name}": {name} for name in ("joblib", "matplotlib", "numpy")},
         **{f"python3-{name}-pip": {name} for name in ("pybullet", "rosbags")},

@@ -18,12 +18,14 @@ from rclpy.signals import SignalHandlerOptions
 
 from robot_formation.errors import FormationError
 from robot_formation.experiment.shared_memory import TracingFiles
-from robot_formation.loopback import use_loopback
+from robot_formation.loopback import stay_here
 
 
 @contextlib.contextmanager
 def node_session(name: str, *, namespace: str = "", **options: Any) -> Iterator[Node]:
     """Join the ROS graph of the environment (ROS_DOMAIN_ID and the like) as one node; signals stay with the caller.
+
+    Where the environment doesn't say how far discovery reaches, it is this machine.
 
     Args:
         name: the node's name.
@@ -34,7 +36,7 @@ def node_session(name: str, *, namespace: str = "", **options: Any) -> Iterator[
         FormationError: the graph can't be joined (a bad ROS_DOMAIN_ID, a middleware that isn't installed).
     """
     tracing = TracingFiles()
-    use_loopback(os.environ)
+    stay_here(os.environ)
     context = Context()
     node = None
     try:
