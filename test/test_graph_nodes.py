@@ -16,7 +16,7 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.launching.environment import node_environment
 from robot_formation.paths import config_dir
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("nodes")]
 
 
 def alone(name, namespace, *arguments, tmp_path):

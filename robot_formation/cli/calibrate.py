@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.cli.calibrate_vision import DESCRIPTION as VISION_DESCRIPTION
 from robot_formation.cli.calibrate_vision import add_options as add_vision_options
 from robot_formation.cli.calibrate_vision import run_vision
+from robot_formation.cli.calibration_options import build_scenario, free_folder
 from robot_formation.cli.parser import whole_number
 from robot_formation.errors import FormationError
 
@@ -157,29 +158,6 @@ def run_encoders(args: argparse.Namespace) -> int:
     return 0
 
 
-def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
-    """Put the scenario together whose robots are measured, on the ground to measure on.
-
-    Without curves, the calibration files that it names are left out: they may be what is to be measured only now.
-
-    Raises:
-        FormationError: naming what is misspelt or out of range.
-    """
-    from robot_formation.experiment import scenario as scenarios
-
-    file, track = args.scenario, "two" if args.track is None else args.track
-    scenario = scenarios.load(file) if file is not None else scenarios.load_track(track)
-    scenario = scenarios.with_surface(scenario, args.surface)
-    if args.seed is not None:
-        scenario = scenarios.with_option(scenario, "seed", args.seed, "--seed")
-    scenario = scenarios.override(scenario, args.set)
-    if not with_curves:
-        for node in ("drive", "fine_tuner"):
-            scenario = scenarios.with_value(scenario, f"{node}.calibration_file", "")
-    scenario.check()
-    return scenario
-
-
 def make_rig(args: argparse.Namespace, scenario: Scenario) -> CalibrationRig:
     """Make the calibration rig of the scenario's ground and robots."""
     from robot_formation.components.catalogue import KINDS
@@ -188,43 +166,6 @@ def make_rig(args: argparse.Namespace, scenario: Scenario) -> CalibrationRig:
 
     world = from_mapping(KINDS["world"].parameter_class(), scenario.parameters("world"), where="world")
     return CalibrationRig(world.make_surface(), world, scenario.setup.seed, args.reference_noise)
-
-
-def free_folder(args: argparse.Namespace, scenario: Scenario, files: tuple[str, ...]) -> Path:
-    """Make the output folder.
-
-    Raises:
-        FormationError: if one of the files is there already and --force isn't given, or the folder can't be made.
-    """
-    folder = _folder_name(args, scenario)
-    for name in files:
-        if (folder / name).exists() and not args.force:
-            raise FormationError(
-                f"{folder / name} exists already and is not overwritten; choose another folder with --out, or "
-                "replace it with --force"
-            )
-    return output_folder(args, scenario)
-
-
-def output_folder(args: argparse.Namespace, scenario: Scenario) -> Path:
-    """Make the output folder, whatever is in it.
-
-    Raises:
-        FormationError: if it can't be made.
-    """
-    folder = _folder_name(args, scenario)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FormationError(f"{folder} can't be made: {error.strerror}; choose another folder with --out") from error
-    return folder
-
-
-def _folder_name(args: argparse.Namespace, scenario: Scenario) -> Path:
-    from robot_formation.paths import default_calibrations_dir
-
-    folder: Path = args.out or default_calibrations_dir() / f"{scenario.setup.name}_seed{scenario.setup.seed}"
-    return folder
 
 
 def _conditions(args: argparse.Namespace, scenario: Scenario) -> dict[str, Any]:

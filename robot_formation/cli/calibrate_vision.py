@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.cli.calibration_options import build_scenario, output_folder
 from robot_formation.cli.parser import number, whole_number
 from robot_formation.cli.sweep import with_progress
 from robot_formation.errors import FormationError
@@ -49,7 +50,6 @@ def run_vision(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments or the folder, or if the curves can't be fitted.
     """
-    from robot_formation.cli.calibrate import build_scenario, output_folder
     from robot_formation.experiment.calibration_vision import BAG_NAME, conditions_of, record_of
     from robot_formation.experiment.vision_grid import positions
     from robot_formation.experiment.vision_table import RECORD_NAME, TABLE_NAME, VisionTable

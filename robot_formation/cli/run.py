@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
             sys.stdout.flush()
             return result.exit_code
     except BrokenPipeError:
-        from robot_formation.cli.main import forget_output
+        from robot_formation.cli.interrupts import forget_output
 
         forget_output()
         return result.exit_code
