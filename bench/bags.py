@@ -75,7 +75,7 @@ def payloads(folder):
 
 
 def formation(environment, *arguments):
-    command = [sys.executable, "-m", "robot_formation.cli.main", *map(str, arguments)]
+    command = [sys.executable, "-m", "robot_formation.cli", *map(str, arguments)]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 

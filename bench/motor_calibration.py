@@ -14,10 +14,10 @@ import numpy as np
 
 from robot_formation.control.calibration import calibrated
 from robot_formation.control.drive import CalibrationParameters, Drive, DriveParameters
-from robot_formation.control.motion import Motion
-from robot_formation.experiment.calibration_course import Course, RobotOnCourse
 from robot_formation.experiment.calibration_motors import calibrate_robot
+from robot_formation.experiment.calibration_rig import CalibrationRig, RobotOnRig
 from robot_formation.experiment.scenario import node_defaults
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
 from robot_formation.world import WorldParameters
@@ -60,7 +60,7 @@ def main():
     driven = {(robot, axis): {} for robot, axis in TESTED}
     for seed in range(options.seeds):
         for name in ("leader", "follower_1"):
-            with RobotOnCourse(Course(floor, world, seed), name) as robot:
+            with RobotOnRig(CalibrationRig(floor, world, seed), name) as robot:
                 kinds = drives(calibrate_robot(robot, defaults, options.repeats), defaults)
                 for axis in (axis for tested, axis in TESTED if tested == name):
                     for kind, parameters in kinds.items():

@@ -18,9 +18,9 @@ from matplotlib.patches import Polygon, Rectangle, Wedge
 from robot_formation.analysis.figures import draw_corrections, draw_trajectory
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.quantities import analyse
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import load_track, with_value
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.launching.processes import run_metadata
 from robot_formation.parameters import from_mapping
 from robot_formation.paths import config_dir

@@ -32,7 +32,7 @@ from robot_formation.cli.sweep import seeds
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
 from robot_formation.control.alignment import TARGET
 from robot_formation.experiment import scenario as scenarios
-from robot_formation.experiment.memory import run_in_memory
+from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.sweep import CONDITIONS
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 from robot_formation.control.drive import Drive, DriveParameters
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import SURFACES, make_surface
 from robot_formation.world import JointStates, RobotStart, World, WorldParameters

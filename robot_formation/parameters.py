@@ -35,6 +35,14 @@ class ParameterError(FormationError):
     """A parameter has an unknown name, a wrong type or a value outside its range; the text says which."""
 
 
+FORMER_NAMES = {
+    "formation.handicap": "formation.initial_loss",
+    "precise.filter.calm_misfit": "precise.filter.calm_nis",
+    "precise.filter.slip_per_lean": "precise.filter.slip_per_tilt",
+}
+"""Names that parameters had before, which are still taken, and today's."""
+
+
 @dataclass(frozen=True)
 class Spec:
     """One parameter: dotted name, Python type, default, unit, closed range or choices, description.
@@ -103,7 +111,7 @@ def specs(cls: type, prefix: str = "", *, defaults: Any = None) -> dict[str, Spe
 
 
 def flatten(values: Mapping[str, Any], prefix: str = "", *, where: str = "parameters") -> dict[str, Any]:
-    """Turn nested mappings into one with dotted names; `where` they stand is for messages.
+    """Turn nested mappings into one with dotted names, today's; `where` they stand is for messages.
 
     Raises:
         ParameterError: if a name is given twice, nested and with dots.
@@ -113,9 +121,12 @@ def flatten(values: Mapping[str, Any], prefix: str = "", *, where: str = "parame
         inner = (
             flatten(value, f"{prefix}{key}.", where=where) if isinstance(value, Mapping) else {f"{prefix}{key}": value}
         )
+        inner = {FORMER_NAMES.get(name, name): inner_value for name, inner_value in inner.items()}
         for name in inner:
             if name in flat:
-                raise ParameterError(f"{where}: '{name}' is given twice, nested and with dots; keep one of them")
+                raise ParameterError(
+                    f"{where}: '{name}' is given twice, nested and with dots or by a former name; keep one of them"
+                )
         flat.update(inner)
     return flat
 

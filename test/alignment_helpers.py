@@ -4,8 +4,8 @@ import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET
 from robot_formation.control.marker_view import EdgeParameters
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.control.relative_pose import GeometryParameters, MarkerModel
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.vision.block import Block
 
 MODEL = MarkerModel(GeometryParameters())

@@ -43,7 +43,7 @@ def launch(scenario, bag, **options):
 
 def formation(*arguments, timeout=300, **options):
     """Call the command line as a user does; neither it nor a node that it starts may give a Python warning."""
-    command = [sys.executable, "-m", "robot_formation.cli.main", *map(str, arguments)]
+    command = [sys.executable, "-m", "robot_formation.cli", *map(str, arguments)]
     options["env"] = {**options.get("env", os.environ), **STRICT}
     completed = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False, **options)
     assert "Warning" not in completed.stderr

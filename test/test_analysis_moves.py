@@ -14,10 +14,10 @@ from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.record import FollowerRecord, RunRecord, Stamped
 from robot_formation.analysis.report import text_report, to_json
 from robot_formation.bag.recorder import Recorder
-from robot_formation.control.motion import Motion
+from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
-from robot_formation.experiment.memory import run_in_memory
 from robot_formation.experiment.scenario import load_track, override
+from robot_formation.geometry.se2 import Motion
 
 V, U, TURN = Motion(0.02), Motion.from_uv(-0.01, 0.0), Motion(yaw_rad=0.1)
 SECOND = 10**9

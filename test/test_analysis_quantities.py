@@ -5,20 +5,18 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from synthetic_bag import Step, SyntheticRun
 
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.from_bag import load_run
-from robot_formation.analysis.quantities import analyse, corrections_of, formation_error_uv_m
+from robot_formation.analysis.quantities import analyse, corrections_of
 from robot_formation.analysis.record import FollowerRecord, RunRecord, Stamped, Track
 from robot_formation.analysis.report import to_json
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.bag.writer import BagWriter
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 
 ROW_KEYS = [
     "t",
@@ -211,26 +209,14 @@ def test_ground_truth_is_the_last_pose_at_or_before_the_report():
         np.array([10, 20, 30]), np.array([[1.0, 0, 0], [2.0, 0, 0], [2.0, 3.0, 4.0]]), np.array([0.1, 0.2, 0.3])
     )
     assert track.at(9) is None
-    assert track.at(10)[0][0] == 1.0
-    assert track.at(29)[1] == 0.2
+    assert track.at(10).x_m == 1.0
+    assert track.at(29).yaw_rad == 0.2
     assert track.length_m == 6.0
 
 
 def test_another_formation_distance_in_the_runs_own_words_is_used():
     assert RunRecord((), (), details={"formation_distance_m": "0.5"}).formation_distance_m == 0.5
     assert RunRecord((), ()).formation_distance_m == 0.32
-
-
-@given(
-    st.lists(st.floats(-3, 3), min_size=2, max_size=2),
-    st.floats(-math.pi, math.pi),
-    st.floats(-0.1, 0.1),
-    st.floats(-0.1, 0.1),
-)
-def test_formation_error_does_not_depend_on_where_the_formation_stands(place, yaw, u, v):
-    rotation = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-    follower = np.array(place) + rotation @ np.array([v, -0.32 - u])
-    assert formation_error_uv_m(follower, np.array(place), yaw, 0.32) == pytest.approx((u, v), abs=1e-9)
 
 
 def test_the_first_move_of_a_timestep_is_no_correction():

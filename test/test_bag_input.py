@@ -282,7 +282,7 @@ def test_a_type_with_other_fields_than_in_jazzy_is_refused(tmp_path):
     path = tmp_path / "bag.mcap"
     writer = McapWriter(str(path))
     writer.start(profile="ros2")
-    schema = writer.register_schema("geometry_msgs/msg/PoseWithCovarianceStamped", "ros2msg", b"float64 surprise")
+    schema = writer.register_schema("geometry_msgs/msg/PoseWithCovarianceStamped", "ros2msg", b"float64 other")
     channel = writer.register_channel(MOVED, "cdr", schema, {})
     writer.add_message(channel, 1, bytes(12), 1)
     writer.finish()

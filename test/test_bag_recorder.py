@@ -12,7 +12,7 @@ from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME, Recorder, own_stamp
 from robot_formation.bag.recover import recover
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 
 POSE, STRING, TICK = "geometry_msgs/msg/PoseStamped", "std_msgs/msg/String", "std_msgs/msg/UInt32"
 SECOND = 10**9

@@ -13,7 +13,7 @@ from robot_formation.control.calibration import (
     save_calibration,
 )
 from robot_formation.control.drive import CalibrationParameters, DriveParameters
-from robot_formation.experiment.drive_curves import describe_curves, robot_curves, robot_facts
+from robot_formation.experiment.drive_check import describe_curves, robot_curves, robot_facts
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
 
@@ -63,7 +63,7 @@ def test_without_a_file_nothing_changes():
 
 def test_the_drive_component_drives_by_its_own_section(file):
     from robot_formation import conversions
-    from robot_formation.control.motion import Motion
+    from robot_formation.geometry.se2 import Motion
 
     sent = {}
     for robot in ("leader", "follower_1"):

@@ -105,7 +105,7 @@ def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(t
 
 
 @pytest.mark.graph
-@pytest.mark.xdist_group("graph")
+@pytest.mark.xdist_group("cli_run")
 def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_path):
     from mcap.reader import make_reader
 
@@ -131,7 +131,7 @@ def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_pa
 
 
 @pytest.mark.graph
-@pytest.mark.xdist_group("graph")
+@pytest.mark.xdist_group("cli_run")
 def test_images_are_recorded_on_request(tmp_path):
     bag = tmp_path / "bag"
     options = ("--camera", "on_demand", "--set", "leader.timesteps=1", "--images", "--json")
@@ -165,7 +165,7 @@ def test_list_names_what_run_takes(capsys):
 def test_a_closed_pipe_is_no_error(tmp_path):
     import subprocess
 
-    command = [sys.executable, "-m", "robot_formation.cli.main", "list"]
+    command = [sys.executable, "-m", "robot_formation.cli", "list"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         errors = process.stderr.read()

@@ -8,7 +8,7 @@ from component_helpers import wired
 from robot_formation import conversions
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.drive import JOINTS, DriveParameters
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import ParameterError
 
 R, E = 0.03, 0.019  # radii of drive and encoder wheels

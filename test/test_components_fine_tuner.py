@@ -7,7 +7,7 @@ from component_helpers import wired
 
 from robot_formation import conversions, exit_codes
 from robot_formation.control.alignment import FRONT, TARGET, AlignmentParameters, PaperAlignment
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.vision.block import Block
 
 BASE, CAMERA = "follower_1/base_link", "follower_1/camera_optical_frame"

@@ -3,7 +3,7 @@
 from component_helpers import wired
 
 from robot_formation import conversions
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 
 DONE = "/formation/leader/done"
 

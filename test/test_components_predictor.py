@@ -9,7 +9,7 @@ import pytest
 from component_helpers import wired
 
 from robot_formation import conversions
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import NAMES, PredictionError, Predictor, PredictorParameters
 
 

@@ -7,9 +7,9 @@ from tag_helpers import needs_tags
 
 from robot_formation import conversions
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
-from robot_formation.control.alignment import FRONT, REAR, TARGET, hulls
+from robot_formation.control.alignment import FRONT, REAR, TARGET, bounding_boxes
+from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
-from robot_formation.experiment.memory import run_in_memory
 from robot_formation.experiment.scenario import load, load_track, node_defaults, override
 from robot_formation.parameters import ParameterError, flatten, from_mapping
 from robot_formation.paths import config_dir
@@ -83,10 +83,10 @@ def test_in_formation_the_target_face_is_a_block_of_50_px_50_px_above_the_centre
 @needs_tags
 @pytest.mark.parametrize(("yaw", "faces"), [(-0.7, {TARGET, FRONT}), (0.7, {TARGET, REAR})])
 def test_signatures_name_the_same_faces_and_boxes_nearly_agree(bench, wire, yaw, faces):
-    found = hulls(second_look(wire, bench.picture(0.0, 0.34, yaw)))
+    found = bounding_boxes(second_look(wire, bench.picture(0.0, 0.34, yaw)))
     assert set(found) == faces
     other = Bench("tags" if bench.kind == "colours" else "colours")
-    theirs = hulls(second_look(other.wire(block_filtering=0), other.picture(0.0, 0.34, yaw)))
+    theirs = bounding_boxes(second_look(other.wire(block_filtering=0), other.picture(0.0, 0.34, yaw)))
     for face in faces:
         # Where two colours meet, the colours' boxes are off by up to 9 px.
         for side, most_px in (("left", 10.0), ("right", 10.0), ("top", 6.0), ("bottom", 6.0)):

@@ -12,9 +12,9 @@ from robot_formation.components.block_detector import BlockDetectorComponent, Bl
 from robot_formation.components.drive import DriveComponent
 from robot_formation.components.world import WorldComponent, WorldNodeParameters
 from robot_formation.control.drive import WHEELS, DriveParameters, WheelCommand
-from robot_formation.control.motion import Motion
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_process import run_in_process
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.surface import SURFACES
 

@@ -13,9 +13,9 @@ from robot_formation.control.alignment import (
     AlignmentParameters,
     PaperAlignment,
     Verdict,
-    hulls,
+    bounding_boxes,
 )
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.block import Block
 
@@ -204,7 +204,7 @@ def test_empty_looks_count_only_in_a_row():
 
 def test_two_blocks_of_one_signature_are_one_hull():
     left, right = Block(TARGET, 145, 60, 20, 48), Block(TARGET, 171, 62, 24, 44)
-    (box,) = hulls([left, right]).values()
+    (box,) = bounding_boxes([left, right]).values()
     assert (box.left, box.right, box.top, box.bottom) == (135, 183, 36, 84)
     assert (box.x, box.width, box.height, box.side) == (159, 48, 48, 48)
     assert PaperAlignment(P).assess([left, right]).verdict is Verdict.ALIGNED
@@ -222,7 +222,7 @@ blocks = st.builds(
 
 @given(found=st.lists(blocks, max_size=6))
 def test_a_hull_holds_its_blocks_and_no_edge_lies_elsewhere(found):
-    boxes = hulls(found)
+    boxes = bounding_boxes(found)
     assert set(boxes) == {b.signature for b in found} - {4}
     for signature, box in boxes.items():
         members = [b for b in found if b.signature == signature]

@@ -9,7 +9,7 @@ from alignment_helpers import blocks_of, state_of
 
 from robot_formation.control.alignment import Verdict
 from robot_formation.control.fine_tuner import FineTuner, FineTunerParameters, Phase, RequestFrames, SendMove
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 
 PAGE = (Path(__file__).parent.parent / "docs" / "alignment.md").read_text(encoding="utf-8")

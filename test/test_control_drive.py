@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_formation.control.drive import JOINTS, CalibrationParameters, Drive, DriveAction, DriveParameters
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 
 P = DriveParameters()

@@ -5,6 +5,7 @@ import math
 import pytest
 
 from robot_formation.control.alignment import FRONT, TARGET, PaperAlignment
+from robot_formation.control.alignment_state import AlignmentState, State
 from robot_formation.control.fine_tuner import (
     Done,
     FineTuner,
@@ -14,10 +15,9 @@ from robot_formation.control.fine_tuner import (
     Report,
     RequestFrames,
     SendMove,
-    State,
     Warn,
 )
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.block import Block
 
@@ -85,14 +85,14 @@ def residual_of(blocks, script):
 def test_timestep_0_only_looks_corrects_and_ticks():
     script = Script()
     assert script.tuner.phase is Phase.NEIGHBOUR
-    assert script.tick(0) == [State("align"), RequestFrames(FRAMES)]
+    assert script.tick(0) == [State(AlignmentState.ALIGN), RequestFrames(FRAMES)]
     assert script.tuner.phase is Phase.LOOK
     (state, move) = script.look(TOO_FAR_BACK)
-    assert state == State("correct: fine-tune v")
+    assert state == State(AlignmentState.CORRECT, "fine-tune v")
     assert move.motion.x_m == pytest.approx(41.5 / 836.0)
     assert script.tuner.phase is Phase.MOVE
     assert script.moved(Motion(0.05)) == [RequestFrames(FRAMES)]
-    assert script.look(IN_PLACE) == [State("aligned"), Done(0)]
+    assert script.look(IN_PLACE) == [State(AlignmentState.ALIGNED), Done(0)]
     assert script.tuner.phase is Phase.NEIGHBOUR
     assert script.tuner.timestep == 1
 
@@ -103,13 +103,13 @@ def test_the_whole_cycle_from_collection_to_prediction():
     script.look(IN_PLACE)
 
     # Collection phase: the leader's own step, ...
-    assert script.tick(1) == [State("collect"), SendMove(Motion(0.05))]
+    assert script.tick(1) == [State(AlignmentState.COLLECT), SendMove(Motion(0.05))]
     assert script.moved(Motion(0.048, 0.001)) == [RequestFrames(FRAMES)]
     (_, correction) = script.look(TOO_FAR_BACK)
     assert isinstance(correction, SendMove)
     assert script.moved(Motion(0.004, -0.002)) == [RequestFrames(FRAMES)]
     state, report = script.look(IN_PLACE)
-    assert state == State("aligned")
+    assert state == State(AlignmentState.ALIGNED)
     assert isinstance(report, Report)
     assert (report.displacement.x_m, report.displacement.y_m) == pytest.approx((0.052, -0.001))
     assert report.residual == residual_of(IN_PLACE, script)
@@ -118,22 +118,22 @@ def test_the_whole_cycle_from_collection_to_prediction():
 
     # ... then twice its own previous displacement, whatever is predicted.
     begun = script.tick(2)
-    assert begun[0] == State("collect")
+    assert begun[0] == State(AlignmentState.COLLECT)
     assert (begun[1].motion.x_m, begun[1].motion.y_m) == pytest.approx((0.052, -0.001))
     script.moved(Motion(0.055, 0.002))
     script.look(IN_PLACE)
     assert script.prediction(Motion(0.2, 0.1)) == [Done(2)]
-    assert script.tick(3) == [State("collect"), SendMove(Motion(0.055, 0.002))]
+    assert script.tick(3) == [State(AlignmentState.COLLECT), SendMove(Motion(0.055, 0.002))]
     script.moved(Motion(0.051, 0.003))
     script.look(IN_PLACE)
     assert script.prediction(Motion(0.041, -0.012)) == [Done(3)]
 
     # From timestep 4 on the prediction.
-    assert script.tick(4) == [State("predict"), SendMove(Motion(0.041, -0.012))]
+    assert script.tick(4) == [State(AlignmentState.PREDICT), SendMove(Motion(0.041, -0.012))]
     script.moved(Motion(0.04, -0.01))
     script.look(IN_PLACE)
     assert script.prediction(Motion(0.042, -0.013)) == [Done(4)]
-    assert script.tick(5) == [State("predict"), SendMove(Motion(0.042, -0.013))]
+    assert script.tick(5) == [State(AlignmentState.PREDICT), SendMove(Motion(0.042, -0.013))]
 
 
 def test_done_is_ticked_only_when_the_prediction_is_in_hand():
@@ -144,7 +144,7 @@ def test_done_is_ticked_only_when_the_prediction_is_in_hand():
     script.moved(Motion(0.05))
     assert not any(isinstance(action, Done) for action in script.look(IN_PLACE))
     assert script.tick(2) == []  # nothing begins before this timestep is finished
-    assert script.prediction(Motion(0.05)) == [Done(1), State("collect"), SendMove(Motion(0.05))]
+    assert script.prediction(Motion(0.05)) == [Done(1), State(AlignmentState.COLLECT), SendMove(Motion(0.05))]
 
 
 def test_the_displacement_composes_turns_between_moves():
@@ -183,7 +183,7 @@ def test_unaligned_after_too_many_corrections_is_warned_reported_and_goes_on():
     script.look(TOO_FAR_BACK)
     script.moved(Motion(0.01))
     state, warning, report = script.look(TOO_FAR_BACK)
-    assert state == State("unaligned")
+    assert state == State(AlignmentState.UNALIGNED)
     assert "not aligned after 1 moves" in warning.text
     assert report.residual == residual_of(TOO_FAR_BACK, script)
     assert script.prediction(Motion(0.05)) == [Done(1)]
@@ -265,17 +265,17 @@ def test_only_frames_stamped_after_the_last_fact_count():
     for stamp_ns in (0, 99, 100, 100):
         assert script.tuner.frame(TOO_FAR_BACK, stamp_ns) == []
     assert script.tuner.frame(IN_PLACE, 101) == []
-    assert script.tuner.frame(IN_PLACE, 102)[0] == State("aligned")
+    assert script.tuner.frame(IN_PLACE, 102)[0] == State(AlignmentState.ALIGNED)
     assert script.tuner.stamp_ns == 102
 
 
 def test_a_repeated_look_does_not_count_the_frames_of_the_one_before():
     script = Script()
     script.tick(0)
-    assert script.look([]) == [State("hold"), RequestFrames(FRAMES)]
+    assert script.look([]) == [State(AlignmentState.HOLD), RequestFrames(FRAMES)]
     for _ in range(3):
         assert script.tuner.frame(IN_PLACE, script.now_ns) == []
-    assert script.look(IN_PLACE) == [State("reacquired"), State("aligned"), Done(0)]
+    assert script.look(IN_PLACE) == [State(AlignmentState.REACQUIRED), State(AlignmentState.ALIGNED), Done(0)]
 
 
 def test_a_look_whose_blocks_change_is_extended_until_they_are_stable():
@@ -284,7 +284,7 @@ def test_a_look_whose_blocks_change_is_extended_until_they_are_stable():
     assert script.frame([]) == []
     assert script.frame(IN_PLACE) == [RequestFrames(3)]
     assert [script.frame(IN_PLACE) for _ in range(2)] == [[], []]
-    assert script.frame(IN_PLACE) == [State("aligned"), Done(0)]
+    assert script.frame(IN_PLACE) == [State(AlignmentState.ALIGNED), Done(0)]
 
 
 def test_extensions_are_bounded_and_then_the_last_frame_decides():
@@ -294,7 +294,7 @@ def test_extensions_are_bounded_and_then_the_last_frame_decides():
     answers = [script.frame(flicker[n % 2]) for n in range(FRAMES + 3 + 3)]
     requests = [n for n, answer in enumerate(answers) if answer == [RequestFrames(3)]]
     assert requests == [FRAMES - 1, FRAMES + 3 - 1]
-    assert answers[-1] == [State("hold"), RequestFrames(FRAMES)]  # its last frame was empty
+    assert answers[-1] == [State(AlignmentState.HOLD), RequestFrames(FRAMES)]  # its last frame was empty
 
 
 def test_another_tracking_index_is_another_block_but_order_and_place_are_not():
@@ -310,7 +310,7 @@ def test_another_tracking_index_is_another_block_but_order_and_place_are_not():
     script.tick(0)
     pair = [*IN_PLACE, Block(5, 20, 20, 9, 9, index=1)]
     script.frame(pair)
-    assert script.frame(pair[::-1])[0] == State("aligned")
+    assert script.frame(pair[::-1])[0] == State(AlignmentState.ALIGNED)
 
 
 @pytest.mark.parametrize(
@@ -328,14 +328,14 @@ def test_a_prediction_beyond_the_range_is_cut_and_said(wish, cut):
     warning, state, move = script.tick(5)
     assert isinstance(warning, Warn)
     assert f"(u {wish.u_m:.3f}, v {wish.v_m:.3f})" in warning.text
-    assert state == State("predict")
+    assert state == State(AlignmentState.PREDICT)
     assert (move.motion.x_m, move.motion.y_m) == (cut.x_m, cut.y_m)
 
 
 def test_a_prediction_at_the_end_of_the_range_is_not_cut():
     script = after_collection()
     script.timestep(4, Motion(0.05), Motion.from_uv(0.05, 0.1))
-    assert script.tick(5) == [State("predict"), SendMove(Motion.from_uv(0.05, 0.1))]
+    assert script.tick(5) == [State(AlignmentState.PREDICT), SendMove(Motion.from_uv(0.05, 0.1))]
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
@@ -347,7 +347,7 @@ def test_a_prediction_that_is_not_finite_becomes_the_previous_displacement(bad):
     warning, done = script.prediction(Motion(0.05, bad))
     assert "finite" in warning.text
     assert done == Done(4)
-    assert script.tick(5) == [State("predict"), SendMove(Motion(0.047, 0.003))]
+    assert script.tick(5) == [State(AlignmentState.PREDICT), SendMove(Motion(0.047, 0.003))]
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
@@ -424,8 +424,8 @@ def test_an_old_tick_of_the_neighbour_starts_nothing():
 def test_a_leader_that_stays_out_of_view_is_lost_after_the_bound_of_looks():
     script = Script(alignment={"max_empty_looks": 2})
     script.tick(0)
-    assert script.look([]) == [State("hold"), RequestFrames(FRAMES)]
-    assert script.look([]) == [State("lost"), Lost()]
+    assert script.look([]) == [State(AlignmentState.HOLD), RequestFrames(FRAMES)]
+    assert script.look([]) == [State(AlignmentState.LOST), Lost()]
     assert script.tuner.phase is Phase.LOST
 
 
@@ -433,9 +433,9 @@ def test_a_leader_that_comes_back_into_view_is_not_lost():
     script = Script(alignment={"max_empty_looks": 2})
     script.tick(0)
     for _ in range(3):
-        assert script.look([]) == [State("hold"), RequestFrames(FRAMES)]
+        assert script.look([]) == [State(AlignmentState.HOLD), RequestFrames(FRAMES)]
         reacquired, _, move = script.look(TOO_FAR_BACK)
-        assert reacquired == State("reacquired")
+        assert reacquired == State(AlignmentState.REACQUIRED)
         assert isinstance(move, SendMove)
         script.moved(Motion(0.01))
-    assert script.look(IN_PLACE) == [State("aligned"), Done(0)]
+    assert script.look(IN_PLACE) == [State(AlignmentState.ALIGNED), Done(0)]

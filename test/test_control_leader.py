@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_formation.control.leader import NOTHING, Leader, LeaderAction, LeaderParameters
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 
 STEP = LeaderAction(move=Motion(x_m=0.05))
 

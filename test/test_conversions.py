@@ -12,8 +12,8 @@ from sensor_msgs.msg import Image, JointState, PointField
 
 from robot_formation import conversions
 from robot_formation.control.drive import JOINTS, WHEELS, WheelCommand
-from robot_formation.control.motion import Motion
 from robot_formation.conversions import MessageError
+from robot_formation.geometry.se2 import Motion
 from robot_formation.vision.block import Block
 
 stamps = st.integers(0, 2**31 * 10**9 - 1)

@@ -9,10 +9,10 @@ import yaml
 from robot_formation import conversions
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import Recorder
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.experiment.in_process import InProcessRun, run_in_process
 from robot_formation.experiment.run_result import RunError
 from robot_formation.experiment.scenario import load_track, override
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.names import absolute
 from robot_formation.paths import config_dir
 

@@ -7,7 +7,6 @@ import pytest
 import yaml
 
 from robot_formation.components.catalogue import KINDS
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as module
 from robot_formation.experiment.scenario import (
@@ -21,6 +20,7 @@ from robot_formation.experiment.scenario import (
     with_option,
     with_surface,
 )
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.koopman.predictors import NAMES, PredictorParameters
 from robot_formation.parameters import from_mapping, specs, to_mapping
 from robot_formation.surface import SURFACES

@@ -96,7 +96,7 @@ def test_a_missing_folder_is_no_error(tmp_path):
 
 
 @pytest.mark.graph
-@pytest.mark.xdist_group("graph")
+@pytest.mark.xdist_group("experiment_shared_memory")
 def test_a_killed_node_leaves_files_that_are_removed_and_a_living_one_keeps_its_own():
     if importlib.util.find_spec("rclpy") is None:
         pytest.skip("ROS is not installed")

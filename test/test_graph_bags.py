@@ -23,7 +23,7 @@ from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import recover
 from robot_formation.bag.writer import BagWriter
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("bags")]
 
 STRING, TICK, IMAGE = "std_msgs/msg/String", "std_msgs/msg/UInt32", "sensor_msgs/msg/Image"
 RELIABLE = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
@@ -39,7 +39,7 @@ class BagLab(Lab):
     """A lab that also calls the command line in its domain."""
 
     def formation(self, *arguments, **options):
-        command = [sys.executable, "-m", "robot_formation.cli.main", *map(str, arguments)]
+        command = [sys.executable, "-m", "robot_formation.cli", *map(str, arguments)]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
         process = subprocess.Popen(command, env=self.environment, text=True, **pipes)
         self.processes.append(process)

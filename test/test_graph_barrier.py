@@ -11,7 +11,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from robot_formation import names
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("barrier")]
 
 FOLLOWER_NODES = ("drive", "block_detector", "predictor", "fine_tuner")
 

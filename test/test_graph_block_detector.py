@@ -11,7 +11,7 @@ from vision_helpers import GROUPS, RED, canvas
 from robot_formation import conversions, names
 from robot_formation.vision.signatures import save_signatures
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("block_detector")]
 SQUARE = canvas(((134, 60, 48, 48), RED))
 
 

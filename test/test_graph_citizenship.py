@@ -19,7 +19,7 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.names import absolute
 from robot_formation.parameters import from_mapping
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("citizenship")]
 
 # A site of its own: whoever hard-codes a name gets out of it.
 SITE = "/site"

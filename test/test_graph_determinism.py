@@ -5,7 +5,7 @@ from graph_tools import BusyCores, displacements, launch, short_scenario
 
 from robot_formation.experiment.in_process import run_in_process
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = pytest.mark.graph
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from robot_formation.analysis.quantities import analyse
 from robot_formation.experiment.domain import domain_ports
 from robot_formation.experiment.shared_memory import find_orphans
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = pytest.mark.graph
 
 NODES = (
     "/world",
@@ -109,7 +109,7 @@ def test_a_lost_leader_ends_the_run_in_good_order(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path, number):
     bag = tmp_path / "bag"
-    command = [sys.executable, "-m", "robot_formation.cli.main", "run", "--camera", "on_demand", "--json"]
+    command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand", "--json"]
     command += ["--set", "leader.timesteps=500", "--bag", str(bag)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         for line in process.stderr:
@@ -131,7 +131,7 @@ def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path, numbe
 
 def test_nodes_end_when_their_launcher_is_killed(tmp_path):
     bag = tmp_path / "bag"
-    command = [sys.executable, "-m", "robot_formation.cli.main", "run", "--camera", "on_demand"]
+    command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand"]
     command += ["--set", "leader.timesteps=500", "--bag", str(bag)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         for line in process.stderr:

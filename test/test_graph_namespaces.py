@@ -9,7 +9,7 @@ from robot_formation.analysis.quantities import analyse
 from robot_formation.bag.reader import read_bag
 from robot_formation.launching.processes import processes, progress
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("namespaces")]
 
 SITES = {"/site_a": 3, "/deep/site_b": 4}  # namespace and seed
 

@@ -29,7 +29,7 @@ def sockets(pid):
 
 
 def on_graph(test):
-    return pytest.mark.graph(pytest.mark.xdist_group("graph")(test))
+    return pytest.mark.graph(pytest.mark.xdist_group("network")(test))
 
 
 @on_graph

@@ -14,7 +14,7 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.nodes.parameters import HostParameters
 from robot_formation.parameters import specs
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("node_starts")]
 
 
 def node(name, *arguments, **options):

@@ -11,12 +11,12 @@ from robot_formation import conversions, names
 from robot_formation.bag.reader import read_bag
 from robot_formation.components.catalogue import KINDS
 from robot_formation.control.drive import WheelCommand
-from robot_formation.control.motion import Motion
 from robot_formation.experiment.domain import DomainReservation
+from robot_formation.geometry.se2 import Motion
 from robot_formation.launching.environment import node_environment
 from robot_formation.paths import config_dir
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("nodes")]
 
 
 def alone(name, namespace, *arguments, tmp_path):

@@ -13,7 +13,7 @@ from robot_formation import conversions, names
 from robot_formation.control.drive import JOINTS, DriveParameters
 from robot_formation.nodes.host import qos_profile
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("real_robots")]
 
 PAGE = Path(__file__).parent.parent / "docs" / "real_robots.md"
 ROBOT = "/follower_1"

@@ -11,7 +11,7 @@ from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.quantities import analyse
 from robot_formation.control.drive import WheelCommand
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("world_services")]
 
 
 class Stranger:

@@ -167,11 +167,11 @@ def test_the_forecast_is_that_of_the_model_plus_the_filtered_residual():
 # --- the mixture ----------------------------------------------------------------------------------------------------
 
 
-def test_the_mixture_weighs_by_discounted_squared_errors_with_a_handicap():
+def test_the_mixture_weighs_by_discounted_squared_errors_with_an_initial_loss():
     parameters = PredictorParameters()
     p = parameters.formation
     tested, models = Mixture(parameters), None
-    losses = np.array([[0.0, 0.0], [p.handicap, p.handicap]])
+    losses = np.array([[0.0, 0.0], [p.initial_loss, p.initial_loss]])
     scale = np.array([p.scale_u_m, p.scale_v_m])
     for x, _, _ in timesteps(25):
         seen = x + 0.002
@@ -179,18 +179,18 @@ def test_the_mixture_weighs_by_discounted_squared_errors_with_a_handicap():
         if models is not None:
             losses = p.discount * losses + 0.5 * ((models - seen) / scale) ** 2
         tested.observe(x)
-        koopman = 0.05 * (tested.insight().k[1:] @ [1.0, *(x / 0.05)])
+        koopman = 0.05 * (tested.diagnostics().k[1:] @ [1.0, *(x / 0.05)])
         models = np.stack([x, koopman])
         weights = np.exp(-losses) / np.exp(-losses).sum(axis=0)
         assert tested.forecast() == pytest.approx((weights * models).sum(axis=0), abs=1e-14)
     shown = np.array2string(weights[1], precision=3, separator=", ")
-    assert tested.insight().notes["weight of koopman"] == shown
+    assert tested.diagnostics().notes["weight of koopman"] == shown
 
 
 def test_persistence_is_believed_first():
     tested = Mixture(PredictorParameters())
     tested.observe(np.array([0.0, 0.05]))
-    weight = float(tested.insight().notes["weight of koopman"].strip("[]").split(",")[0])
+    weight = float(tested.diagnostics().notes["weight of koopman"].strip("[]").split(",")[0])
     assert weight == pytest.approx(1.0 / (1.0 + np.e), abs=1e-3)
 
 

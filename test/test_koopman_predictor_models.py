@@ -77,13 +77,13 @@ def test_a_linear_law_is_forecast_exactly(name):
     assert forecasts(name, history)[2:] == pytest.approx(np.array([k @ x for x in history[2:]]), abs=1e-9)
 
 
-def test_insight_of_measured_shows_the_last_innovation():
+def test_diagnostics_of_measured_show_the_last_innovation():
     found = predictor("measured")
     for x in HISTORY[:-1]:
         found.observe(np.array(x))
-    k = found.insight().k
+    k = found.diagnostics().k
     found.observe(np.array(HISTORY[-1]))
-    assert found.insight().innovation == pytest.approx(np.array(HISTORY[-1]) - k @ np.array(HISTORY[-2]))
+    assert found.diagnostics().innovation == pytest.approx(np.array(HISTORY[-1]) - k @ np.array(HISTORY[-2]))
 
 
 # --- the trend filter -----------------------------------------------------------------------------------------------
@@ -180,17 +180,17 @@ def test_edmd_repeats_the_last_displacement_until_its_delays_are_filled():
     assert forecasts("edmd", HISTORY, edmd=p)[:3] == pytest.approx(np.array(HISTORY[:3]), abs=0.0)
 
 
-def test_insight_of_edmd_names_its_observables_and_tells_the_innovation_in_metres():
+def test_diagnostics_of_edmd_name_its_observables_and_the_innovation_in_metres():
     p = EdmdParameters(dictionary="constant monomials:2", prior=1.0)
     model = Edmd(p)
-    assert model.insight().innovation is None
+    assert model.diagnostics().innovation is None
     for x in HISTORY[:-1]:
         model.observe(np.array(x))
     expected = model.forecast()
     model.observe(np.array(HISTORY[-1]))
-    insight = model.insight()
-    assert insight.innovation == pytest.approx(np.array(HISTORY[-1]) - expected, abs=1e-15)
-    assert insight.notes["observables"] == "1, u, v, u^2, u v, v^2"
+    diagnostics = model.diagnostics()
+    assert diagnostics.innovation == pytest.approx(np.array(HISTORY[-1]) - expected, abs=1e-15)
+    assert diagnostics.notes["observables"] == "1, u, v, u^2, u v, v^2"
 
 
 # --- dictionaries in words ------------------------------------------------------------------------------------------

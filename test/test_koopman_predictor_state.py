@@ -35,8 +35,8 @@ def shown(values, count):
     return found
 
 
-def insight(found):
-    seen = found.insight()
+def diagnostics(found):
+    seen = found.diagnostics()
     arrays = [None if part is None else part.tolist() for part in (seen.k, seen.innovation)]
     return arrays, seen.condition_number, seen.notes
 
@@ -50,12 +50,12 @@ def test_json_and_back_goes_on_to_the_last_bit(values, count):
     assert json.dumps(other.state()) == text
     if count:
         assert all((a == b).all() for a, b in zip(one.predict(), other.predict(), strict=True))
-    assert insight(one) == insight(other)
+    assert diagnostics(one) == diagnostics(other)
     for timestep in timesteps(12, seed=9):
         one.observe(*timestep)
         other.observe(*timestep)
         assert all((a == b).all() for a, b in zip(one.predict(), other.predict(), strict=True))
-    assert insight(one) == insight(other)
+    assert diagnostics(one) == diagnostics(other)
 
 
 def test_a_state_is_of_the_moment_when_it_was_taken(values):

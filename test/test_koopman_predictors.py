@@ -133,7 +133,7 @@ def test_awkward_histories_give_bounded_forecasts(name, kind, where):
         x, r, c = (odd if where in (part, "all") else value for part, value in zip(PARTS, (x, r, c), strict=True))
         found.observe(x, r, c)
         check(found.predict())
-        found.insight()
+        found.diagnostics()
 
 
 @pytest.mark.filterwarnings("error")
@@ -239,33 +239,33 @@ def test_the_second_moment_about_the_command_holds_the_bias_that_was_taken_off()
     assert (plain.predict().about_command == plain.predict().covariance).all()
 
 
-# --- insight --------------------------------------------------------------------------------------------------------
+# --- diagnostics ------------------------------------------------------------------------------------------------
 
 
-def test_insight_shows_k_with_its_eigenvalues_where_there_is_one(name):
+def test_diagnostics_show_k_with_its_eigenvalues_where_there_is_one(name):
     found = predictor(name)
     for x in HISTORY:
         found.observe(np.array(x))
-    insight = found.insight()
+    diagnostics = found.diagnostics()
     size = {"measured": 2, "literal": 2, "edmd": 3, "formation": 3}.get(name.removesuffix("+close"))
     if size is None:
-        assert insight.k is insight.eigenvalues is insight.condition_number is None
+        assert diagnostics.k is diagnostics.eigenvalues is diagnostics.condition_number is None
         return
-    assert insight.k.shape == (size, size)
-    assert np.sum(insight.eigenvalues).real == pytest.approx(np.trace(insight.k))
-    assert np.prod(insight.eigenvalues).real == pytest.approx(np.linalg.det(insight.k))
+    assert diagnostics.k.shape == (size, size)
+    assert np.sum(diagnostics.eigenvalues).real == pytest.approx(np.trace(diagnostics.k))
+    assert np.prod(diagnostics.eigenvalues).real == pytest.approx(np.linalg.det(diagnostics.k))
     if size == 2:
         used = HISTORY[:2] if name == "literal" else HISTORY[:-1]
-        assert insight.condition_number == pytest.approx(np.linalg.cond(np.array(used)), rel=1e-6)
-    assert insight.condition_number > 1.0
+        assert diagnostics.condition_number == pytest.approx(np.linalg.cond(np.array(used)), rel=1e-6)
+    assert diagnostics.condition_number > 1.0
 
 
 @pytest.mark.parametrize("name", CLOSING)
-def test_insight_shows_residual_and_bias_of_those_that_close_them(name):
+def test_diagnostics_show_residual_and_bias_of_those_that_close_them(name):
     found = predictor(name)
     for timestep in timesteps(10):
         found.observe(*timestep)
-    notes = found.insight().notes
+    notes = found.diagnostics().notes
     assert {"residual [m]", "actuation bias [m]"} <= set(notes)
     bias = found.predict().mean - found.predict().command
     assert notes["actuation bias [m]"] == np.array2string(bias, precision=6, separator=", ")

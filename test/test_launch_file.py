@@ -15,7 +15,7 @@ from robot_formation.experiment.scenario import load_track
 from robot_formation.launching.processes import processes
 from robot_formation.paths import share_dir
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("launch_file")]
 DEADLINE_S = 120.0
 PROGRESS = 1  # the node beside those of the run
 

@@ -217,3 +217,15 @@ def test_a_nested_dataclass_keeps_the_defaults_that_its_owner_gives_it():
         assert from_mapping(Outer, {"middle.inner.a": 9.0}, where="test").middle.inner == Inner(a=9.0, b=7.0)
     finally:
         del globals()["Inner"], globals()["Middle"]
+
+
+def test_former_names_of_parameters_are_still_taken():
+    from robot_formation.components.catalogue import KINDS
+    from robot_formation.parameters import FORMER_NAMES, specs
+
+    known = {name for kind in KINDS.values() for name in specs(kind.parameter_class())}
+    assert set(FORMER_NAMES.values()) <= known
+    assert known.isdisjoint(FORMER_NAMES)
+    assert flatten({"formation": {"handicap": 2.0}}) == {"formation.initial_loss": 2.0}
+    with pytest.raises(ParameterError, match="given twice"):
+        flatten({"formation.handicap": 2.0, "formation.initial_loss": 1.0})

@@ -136,7 +136,7 @@ def test_git_keeps_the_samples_and_ignores_runs(path, ignored):
 
 
 @pytest.mark.graph
-@pytest.mark.xdist_group("graph")
+@pytest.mark.xdist_group("sample_bags")
 def test_the_script_makes_a_bag_in_the_place_of_the_old_one(tmp_path):
     (tmp_path / "pictures").mkdir()
     (tmp_path / "pictures" / "old").touch()

@@ -16,8 +16,8 @@ from robot_formation.bag.reader import read_bag
 from robot_formation.cli.main import main
 from robot_formation.control.alignment import AlignmentParameters
 from robot_formation.control.calibration import CalibrationError
+from robot_formation.control.camera_samples import CameraSample
 from robot_formation.control.marker_view import EdgeParameters
-from robot_formation.control.sightings import Sighting
 from robot_formation.control.vision_calibration import load_vision
 from robot_formation.experiment import calibration_vision, vision_table
 from robot_formation.experiment.calibration_vision import conditions_of
@@ -87,14 +87,14 @@ def test_a_look_sees_the_face_where_the_pinhole_projects_it_and_nothing_where_ro
 
 def test_the_true_faces_are_those_of_the_pinhole():
     world = conditions_of(override(load_track("two"), ["world.surface=plane"])).world
-    faces = true_faces(world, Sighting(0.3, 0.02, 0.0, True))
+    faces = true_faces(world, CameraSample(0.3, 0.02, 0.0, True))
     columns = [157.5 + 273.7 * (x - 0.02) / 0.308 for x in (-0.03, 0.03)]
     rows = [103.5 - 273.7 * (z - 0.126) / 0.308 for z in (0.216, 0.156)]
     assert faces[1] == pytest.approx(np.array([[column, row] for column in columns for row in rows]))
-    ahead = true_faces(world, Sighting(0.3, 0.05, 0.0, True))[2]
+    ahead = true_faces(world, CameraSample(0.3, 0.05, 0.0, True))[2]
     assert ahead[0, 0] == pytest.approx(157.5 - 273.7 * 0.02 / 0.308)
     assert ahead[2, 0] == pytest.approx(157.5 - 273.7 * 0.02 / 0.368)
-    assert 2 not in true_faces(world, Sighting(-0.02, 0.2, 0.0, True))  # it reaches behind the lens
+    assert 2 not in true_faces(world, CameraSample(-0.02, 0.2, 0.0, True))  # it reaches behind the lens
 
 
 def test_a_look_depends_on_seed_and_position_only():
@@ -116,7 +116,7 @@ def test_the_files_agree_with_each_other_and_with_the_nodes_defaults(measured, c
     for name, error in said["standard_errors"].items():
         if name in said["alignment"] and name != "side_bias_px":  # the default takes it with another side_px_m
             assert abs(said["alignment"][name] - getattr(defaults, name)) < 4.0 * error, name
-    rows = list(csv.DictReader((measured / "vision.csv").open()))
+    rows = list(csv.DictReader((measured / "vision.csv").read_text().splitlines()))
     assert tuple(rows[0]) == COLUMNS
     table = list(read_table(measured / "vision.csv"))
     assert said["looks"] == {
@@ -142,14 +142,14 @@ def test_the_bag_holds_every_attainable_look_with_both_true_poses(measured):
     assert len(found) == len(looked)
     order = {(p.u_m, p.v_m): n for n, p in enumerate(positions(0.45, 0.238))}
     looked.sort(key=lambda s: (order[s.u_m, s.v_m], s.clockwise_deg))
-    for sighting, message, leader, follower in zip(looked, found, *poses.values(), strict=True):
+    for sample, message, leader, follower in zip(looked, found, *poses.values(), strict=True):
         points = np.frombuffer(message.data, conversions.BLOCK_DTYPE)
-        assert [Block(*map(int, point)) for point in points] == list(sighting.blocks)
+        assert [Block(*map(int, point)) for point in points] == list(sample.blocks)
         # The pair heads along +y: ahead is +y, right is +x.
         offset = (follower.position.x - leader.position.x, follower.position.y - leader.position.y)
-        assert offset == pytest.approx((sighting.u_m, sighting.v_m), abs=1e-9)
+        assert offset == pytest.approx((sample.u_m, sample.v_m), abs=1e-9)
         yaw = 2.0 * math.atan2(follower.orientation.z, follower.orientation.w)
-        assert math.degrees(math.remainder(math.pi / 2 - yaw, math.tau)) == pytest.approx(sighting.clockwise_deg)
+        assert math.degrees(math.remainder(math.pi / 2 - yaw, math.tau)) == pytest.approx(sample.clockwise_deg)
 
 
 def test_a_stopped_calibration_goes_on_where_it_was_and_ends_the_same(measured, capsys, tmp_path, monkeypatch):
@@ -194,17 +194,17 @@ def test_other_conditions_need_another_folder_or_force(measured, capsys, tmp_pat
 
 def test_a_table_keeps_whole_positions_only_and_damaged_lines_are_told(tmp_path):
     places = [Position(0.3, 0.0, (0.0, 15.0)), Position(0.4, 0.0, (0.0, 15.0))]
-    sightings = [
+    samples = [
         [
-            Sighting(p.u_m, p.v_m, a, True, 22, (Block(1, 150, 60, 40, 40, 0, 3, 1),) * n)
+            CameraSample(p.u_m, p.v_m, a, True, 22, (Block(1, 150, 60, 40, 40, 0, 3, 1),) * n)
             for n, a in enumerate((0.0, 15.0))
         ]
         for p in places
     ]
     table = VisionTable(tmp_path, {"seed": 1}, places)
-    for found in sightings:
+    for found in samples:
         table.add(found)
-    assert table.all(places) == [s for found in sightings for s in found]
+    assert table.all(places) == [s for found in samples for s in found]
     lines = table.path.read_text().splitlines(keepends=True)
     table.path.write_text("".join(lines[:-1]))
     again = VisionTable(tmp_path, {"seed": 1}, places)

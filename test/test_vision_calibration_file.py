@@ -17,7 +17,7 @@ from robot_formation.control.vision_calibration import (
     load_vision,
     save_vision,
 )
-from robot_formation.experiment.camera_facts import camera_facts, camera_values, check_camera, describe_camera
+from robot_formation.experiment.camera_check import camera_facts, camera_values, check_camera, describe_camera
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
 from robot_formation.parameters import from_mapping

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET
 from robot_formation.control.calibration import CalibrationError
+from robot_formation.control.camera_samples import CameraSample, overlay
 from robot_formation.control.edge_bias import edge_biases
 from robot_formation.control.marker_view import EdgeParameters
-from robot_formation.control.sightings import Sighting, overlay
 from robot_formation.control.vision_fit import (
     alone_range,
     compared_distances,
@@ -34,7 +34,7 @@ def seen(u, v, *, lens_right=0.038, lens_ahead=0.0, rounded=False, focal=FOCAL_P
     if rounded:  # edges to the detector's cells of 2 px
         left, right = (2 * round((x + sign * side / 2) / 2) for sign in (-1, 1))
         x, side = (left + right) / 2, right - left
-    return Sighting(u, v, 0.0, True, 22, (Block(TARGET, x, 60, side, side - 1),))
+    return CameraSample(u, v, 0.0, True, 22, (Block(TARGET, x, 60, side, side - 1),))
 
 
 def field(**camera):
@@ -83,10 +83,10 @@ def test_the_window_and_the_difference_in_it_are_those_of_the_projection():
 def test_only_whole_target_faces_of_a_parallel_follower_are_views():
     front = Block(FRONT, 120, 60, 10, 40)
     good, beside = seen(0.3, 0.0), seen(0.3, 0.05)
-    with_front = Sighting(0.3, 0.05, 0.0, True, 22, (*beside.blocks, front))
-    turned = Sighting(0.3, 0.0, 15.0, True, 22, good.blocks)
-    cut = Sighting(0.3, 0.1, 0.0, True, 22, (Block(TARGET, 20, 60, 34, 40),))
-    views = face_views([with_front, turned, cut, Sighting(0.3, 0.2, 0.0, True, 22), good])
+    with_front = CameraSample(0.3, 0.05, 0.0, True, 22, (*beside.blocks, front))
+    turned = CameraSample(0.3, 0.0, 15.0, True, 22, good.blocks)
+    cut = CameraSample(0.3, 0.1, 0.0, True, 22, (Block(TARGET, 20, 60, 34, 40),))
+    views = face_views([with_front, turned, cut, CameraSample(0.3, 0.2, 0.0, True, 22), good])
     assert [(view.v_m, view.alone) for view in views] == [(0.0, True), (0.05, False)]
 
 
@@ -96,7 +96,7 @@ def test_views_that_do_not_determine_the_curves_are_refused():
     with pytest.raises(CalibrationError, match="too few"):
         fit_camera(face_views([seen(0.3, v / 100) for v in range(-5, 6)]), EDGE_M)
     same = Block(TARGET, 150, 60, 40, 40)
-    stuck = [Sighting(s.u_m, s.v_m, 0.0, True, 22, (same,)) for s in field()]
+    stuck = [CameraSample(s.u_m, s.v_m, 0.0, True, 22, (same,)) for s in field()]
     with pytest.raises(CalibrationError, match="lie on no"):
         fit_camera(face_views(stuck), EDGE_M)
 
@@ -104,7 +104,9 @@ def test_views_that_do_not_determine_the_curves_are_refused():
 def test_the_face_is_alone_up_to_the_first_place_that_shows_another():
     front = Block(FRONT, 120, 60, 10, 40)
     places = [seen(0.3, v / 100) for v in range(-4, 7)]
-    shown = [Sighting(s.u_m, s.v_m, 0.0, True, 22, (*s.blocks, front)) if s.v_m in (0.04, 0.05) else s for s in places]
+    shown = [
+        CameraSample(s.u_m, s.v_m, 0.0, True, 22, (*s.blocks, front)) if s.v_m in (0.04, 0.05) else s for s in places
+    ]
     assert alone_range(face_views(shown), 0.3) == (-0.04, 0.03)
     assert alone_range(face_views(shown), 0.4) == (0.0, 0.0)
 
@@ -112,7 +114,7 @@ def test_the_face_is_alone_up_to_the_first_place_that_shows_another():
 def looks(u, v, *signatures):
     """A position's looks: signatures of each angle, None where the robots overlap."""
     return [
-        Sighting(u, v, angle, found is not None, 22, tuple(Block(s, 100, 50, 20, 20) for s in found or ()))
+        CameraSample(u, v, angle, found is not None, 22, tuple(Block(s, 100, 50, 20, 20) for s in found or ()))
         for angle, found in enumerate(signatures)
     ]
 
@@ -128,8 +130,8 @@ def test_each_area_is_what_its_views_have_in_common():
         "target or rear": ((), (TARGET,), (TARGET, REAR)),
         "front or rear": ((FRONT, REAR), (), ()),
     }
-    sightings = [s for n, signatures in enumerate(cases.values()) for s in looks(n, 0.0, *signatures)]
-    places = overlay(sightings)
+    samples = [s for n, signatures in enumerate(cases.values()) for s in looks(n, 0.0, *signatures)]
+    places = overlay(samples)
     assert [place.area for place in places] == list(cases)
     for place, signatures in zip(places, cases.values(), strict=True):
         assert place.angles == 3
@@ -146,7 +148,7 @@ def test_standard_errors_are_those_of_repeated_calibrations():
     fits = []
     for _ in range(100):
         noisy = [
-            Sighting(s.u_m, s.v_m, 0.0, True, 22, (Block(TARGET, b.x + rng.normal(0, 0.5), 60, side, side),))
+            CameraSample(s.u_m, s.v_m, 0.0, True, 22, (Block(TARGET, b.x + rng.normal(0, 0.5), 60, side, side),))
             for s in field()
             for b in s.blocks
             for side in (b.width + rng.normal(0, 0.5),)
@@ -164,7 +166,7 @@ def face(left, right, top=40.0, bottom=90.0, slant=0.0):
 
 
 def reported(*blocks):
-    return Sighting(0.3, 0.0, 0.0, True, 22, tuple(Block(s, (a + b) / 2, 65, b - a, 46) for s, a, b in blocks))
+    return CameraSample(0.3, 0.0, 0.0, True, 22, tuple(Block(s, (a + b) / 2, 65, b - a, 46) for s, a, b in blocks))
 
 
 def test_edge_biases_are_reported_minus_true_where_the_edge_is_what_it_seems():
@@ -188,7 +190,7 @@ def test_edges_of_neighbouring_faces_count_beside_the_target_block_only():
     wide = reported((TARGET, 152, 200), (FRONT, 202, 229))
     narrow = reported((TARGET, 152, 200), (FRONT, 202, 208))
     rear = reported((TARGET, 152, 200), (REAR, 123, 150))
-    small = Sighting(0.6, 0.0, 0.0, True, 22, (Block(TARGET, 176, 65, 48, 30), Block(REAR, 136.5, 65, 27, 30)))
+    small = CameraSample(0.6, 0.0, 0.0, True, 22, (Block(TARGET, 176, 65, 48, 30), Block(REAR, 136.5, 65, 27, 30)))
     looks = [(look, faces) for look in (wide, narrow, rear, small) for _ in range(3)]
     found = edge_biases([*looks, (reported(), faces)])
     means = {name: bias.mean_px for name, bias in found.items()}

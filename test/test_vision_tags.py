@@ -92,8 +92,8 @@ def test_a_drawn_tag_is_found_with_its_corners_in_order(face, side):
     face=st.sampled_from(list(Face)),
 )
 def test_a_tag_seen_obliquely_is_reported_as_its_bounding_box(side, squeeze, slant, left, top, face):
-    right, lean = left + squeeze * side, slant * side
-    truth = np.array([(left, top), (right, top + lean), (right, top + side - lean), (left, top + side)])
+    right, shear = left + squeeze * side, slant * side
+    truth = np.array([(left, top), (right, top + shear), (right, top + side - shear), (left, top + side)])
     (box,) = DETECTOR.detect(drawn(face, truth))
     assert box.signature == face
     reported = (box.x - box.width / 2, box.x + box.width / 2, box.y - box.height / 2, box.y + box.height / 2)

@@ -41,7 +41,7 @@ def test_the_target_face_appears_where_a_pinhole_puts_its_corners(surface, ahead
     corners = CORNERS @ seen.matrix().T + np.array(seen.position)
     pixels = camera.project(looking, corners)
     left, right, top, bottom = box_of(redness(camera.light(looking, [seen])))
-    # Target's picture spans its corners; on the bowl both robots lean alike up to a few degrees.
+    # Target's picture spans its corners; on the bowl both robots are tilted alike up to a few degrees.
     assert left == pytest.approx(pixels[:, 0].min(), abs=1.0)
     assert right == pytest.approx(pixels[:, 0].max(), abs=1.0)
     assert top == pytest.approx(pixels[:, 1].min(), abs=1.0)

@@ -7,7 +7,7 @@ import pytest
 from world_helpers import IDEAL, SPEEDS, displacement, of_kind, parameters, run, world
 
 from robot_formation.control.drive import Drive, DriveParameters
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import SURFACES, make_surface
 from robot_formation.world import JointStates, RobotStart, World
 

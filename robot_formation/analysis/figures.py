@@ -103,7 +103,7 @@ def _contours(axes: Any, ground: Ground) -> None:
 def _path(axes: Any, track: Track, stops_ns: list[int], colour: str, label: str) -> None:
     xy = track.positions_m[:, :2] * _CM
     axes.plot(*xy.T, color=colour, linewidth=1.8, label=label, zorder=3)
-    at_rest = [pose[0] * _CM for stamp in stops_ns if (pose := track.at(stamp)) is not None]
+    at_rest = [(pose.x_m * _CM, pose.y_m * _CM) for stamp in stops_ns if (pose := track.at(stamp)) is not None]
     if at_rest:
         axes.plot(*np.array(at_rest).T, ".", color=colour, markersize=6, zorder=3)
 

@@ -19,7 +19,8 @@ from robot_formation.analysis.record import FollowerRecord, Ground, OverheadTrac
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.orientation import yaw_rad
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import suggestion
 
 _TRIANGLE_LIST = 11
@@ -207,8 +208,7 @@ def _motion(pose: Any) -> Motion:
 
 
 def _yaw(quaternion: Any) -> float:
-    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
-    return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    return yaw_rad((quaternion.x, quaternion.y, quaternion.z, quaternion.w))
 
 
 def _track(messages: Sequence[Any]) -> Track | None:

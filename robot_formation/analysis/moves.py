@@ -14,7 +14,6 @@ loss
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -22,14 +21,15 @@ from statistics import median
 from typing import Any
 
 from robot_formation.analysis.record import FollowerRecord
-from robot_formation.control.motion import Motion
+from robot_formation.control.alignment_state import AlignmentState
+from robot_formation.geometry.se2 import Motion
 
 AXES = ("u", "v", "turn")
 UNKNOWN = "unknown"
 """Kind of a move of which the fine-tuner said nothing."""
 _LEAST = 1e-4
-_OPENING = ("collect", "predict")
-_NOT_SEEN = ("hold", "search")
+_NOT_SEEN = (AlignmentState.HOLD, AlignmentState.SEARCH)
+_SEEN_OR_LOST = (AlignmentState.REACQUIRED, AlignmentState.LOST)
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,9 @@ def moves_of(follower: FollowerRecord, indices: Sequence[int], t: int) -> Moves:
         t: the timestep.
     """
     corrections = indices[1:]
-    said = [text for text in _texts(follower, t) if _word(text) in ("correct", "search")]
-    said += [UNKNOWN] * (len(corrections) - len(said))
-    return Moves(_axes(follower, corrections), dict(Counter(said[: len(corrections)])))
+    kinds = [text for text in _texts(follower, t) if (state := AlignmentState.parse(text)) and state.corrects]
+    kinds += [UNKNOWN] * (len(corrections) - len(kinds))
+    return Moves(_axes(follower, corrections), dict(Counter(kinds[: len(corrections)])))
 
 
 def summed(moves: Sequence[Moves]) -> Moves:
@@ -83,13 +83,13 @@ def losses(follower: FollowerRecord) -> tuple[Loss, ...]:
     begun: int | None = None
     looks = moves = 0
     for number, (t, text) in enumerate(_with_timestep(follower.states)):
-        word = _word(text)
-        if word in _NOT_SEEN:
+        state = AlignmentState.parse(text)
+        if state in _NOT_SEEN:
             begun = number if begun is None else begun
-            looks, moves = looks + 1, moves + (word == "search")
-        elif word in ("reacquired", "lost"):
+            looks, moves = looks + 1, moves + (state is AlignmentState.SEARCH)
+        elif state in _SEEN_OR_LOST:
             first = number if begun is None else begun
-            found.append(Loss(t, looks, moves, _seconds(follower, first, number), word == "reacquired"))
+            found.append(Loss(t, looks, moves, _seconds(follower, first, number), state is AlignmentState.REACQUIRED))
             begun, looks, moves = None, 0, 0
     if begun is not None:
         last = len(follower.states) - 1
@@ -120,15 +120,12 @@ def move_totals(timesteps: Sequence[Moves], movements: Sequence[int], follower: 
     }
 
 
-def _word(text: str) -> str:
-    return text.split(":")[0]
-
-
 def _with_timestep(states: Sequence[str]) -> Iterator[tuple[int, str]]:
     """Pair each state with its timestep: a prediction move opens the next one."""
     t = 0
     for text in states:
-        t += _word(text) in _OPENING
+        state = AlignmentState.parse(text)
+        t += state is not None and state.opens_timestep
         yield t, text
 
 
@@ -172,8 +169,8 @@ def _legs(follower: FollowerRecord, indices: Sequence[int]) -> Iterator[tuple[st
 
 def _sizes(motion: Motion) -> tuple[float, float, float]:
     """Lengths of a move's legs along u and v and of its turn; the drive turns first."""
-    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-    return abs(c * motion.y_m - s * motion.x_m), abs(c * motion.x_m + s * motion.y_m), abs(motion.yaw_rad)
+    turn, forward, left = motion.legs
+    return abs(left), abs(forward), abs(turn)
 
 
 def _seconds(follower: FollowerRecord, first: int, last: int) -> float | None:

@@ -36,7 +36,7 @@ from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.moves import Moves, move_totals, movements_of, moves_of
 from robot_formation.analysis.record import FollowerRecord, RunRecord
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.names import beacon_neighbour
 
 ELLIPSE_90 = -2.0 * math.log(0.1)
@@ -221,16 +221,6 @@ def overhead_errors(record: RunRecord) -> dict[str, dict[str, float]] | None:
     } or None
 
 
-def formation_error_uv_m(
-    position_f: NDArray[np.float64], position_b: NDArray[np.float64], yaw_b: float, distance_m: float
-) -> tuple[float, float]:
-    """Formation error (u, v) in the beacon neighbour's frame, metres; positions (2,) are world x, y in metres."""
-    dx, dy = position_f - position_b
-    cosine, sine = math.cos(yaw_b), math.sin(yaw_b)
-    forward, left = cosine * dx + sine * dy, -sine * dx + cosine * dy
-    return -(left + distance_m), forward
-
-
 def corrections_of(follower: FollowerRecord, indices: Sequence[int]) -> Corrections:
     """Sum up a timestep's moves without the first, which is the prediction move."""
     motions = [follower.moved[index].motion for index in indices[1:]]
@@ -275,8 +265,8 @@ def _ground_truth(record: RunRecord, robot: str, stamp_ns: int) -> tuple[tuple[f
     pose_b = other.at(stamp_ns) if other else None
     if pose_f is None or pose_b is None:
         return None, None
-    heading_error = math.remainder(pose_f[1] - pose_b[1], math.tau)
-    return formation_error_uv_m(pose_f[0], pose_b[0], pose_b[1], record.formation_distance_m), heading_error
+    heading_error = math.remainder(pose_f.yaw_rad - pose_b.yaw_rad, math.tau)
+    return formation_error_uv_m(pose_f, pose_b, record.formation_distance_m), heading_error
 
 
 def _error_statistics(errors_uv_m: NDArray[np.float64]) -> dict[str, float | None]:

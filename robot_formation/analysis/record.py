@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.control.alignment_state import AlignmentState
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 
 DOT_HEIGHT_M = 0.216
 """Height of the reference dot above base_link (paper: the robot's height)."""
@@ -40,10 +41,13 @@ class Track:
     positions_m: NDArray[np.float64]
     yaws_rad: NDArray[np.float64]
 
-    def at(self, stamp_ns: int) -> tuple[NDArray[np.float64], float] | None:
-        """Return x and y (2,) in metres and the heading in radians of the last pose at or before the stamp, if any."""
+    def at(self, stamp_ns: int) -> Motion | None:
+        """Return the last pose at or before the stamp in the world's plane, if there is any."""
         index = int(np.searchsorted(self.stamps_ns, stamp_ns, side="right")) - 1
-        return (self.positions_m[index, :2], float(self.yaws_rad[index])) if index >= 0 else None
+        if index < 0:
+            return None
+        x_m, y_m = self.positions_m[index, :2].tolist()
+        return Motion(x_m, y_m, float(self.yaws_rad[index]))
 
     @property
     def length_m(self) -> float:
@@ -78,7 +82,7 @@ class FollowerRecord:
     @property
     def lost(self) -> bool:
         """Whether it lost its beacon neighbour from view."""
-        return any(state.split(":")[0] == "lost" for state in self.states)
+        return any(AlignmentState.parse(text) is AlignmentState.LOST for text in self.states)
 
 
 @dataclass(frozen=True)

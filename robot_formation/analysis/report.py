@@ -15,7 +15,7 @@ from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, T
 from robot_formation.analysis.record import RunRecord
 from robot_formation.bag.folder import bag_name
 from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 
 _HEADERS = (
     ("", "predicted", "moved", "correction", "residual", "moves", "formation", "heading"),

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from robot_formation.analysis.drawing import new_figure, save_figure
-from robot_formation.control.motion import FORMATION_DISTANCE_M
-from robot_formation.control.sightings import Kind, Overlay, Sighting, kinds_of, overlay
+from robot_formation.control.camera_samples import CameraSample, Kind, Overlay, kinds_of, overlay
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
 _CM = 100.0
 # The paper's colours, from Okabe and Ito's palette.
@@ -21,12 +21,12 @@ _COLUMNS = 3
 
 
 def draw_areas(
-    sightings: Sequence[Sighting], body_m: tuple[float, float], edge_m: float, title: str, path: str | Path
+    samples: Sequence[CameraSample], body_m: tuple[float, float], edge_m: float, title: str, path: str | Path
 ) -> Path:
     """Draw the four areas over the neighbour's frame, u to the right and v up, with the neighbour at the origin.
 
     Args:
-        sightings: of the grid; positions that were looked at under fewer angles than others are left out.
+        samples: of the grid; positions that were looked at under fewer angles than others are left out.
         body_m: length and width of a robot.
         edge_m: edge of the marker.
         title: over everything.
@@ -35,11 +35,11 @@ def draw_areas(
     Raises:
         AnalysisError: the file can't be written.
     """
-    places = overlay(sightings)
+    places = overlay(samples)
     most = max(place.angles for place in places)
     places = [place for place in places if place.angles == most]
     kept = {(place.u_m, place.v_m) for place in places}
-    angles = sorted({s.clockwise_deg for s in sightings if (s.u_m, s.v_m) in kept})
+    angles = sorted({s.clockwise_deg for s in samples if (s.u_m, s.v_m) in kept})
     rows = -(-len(angles) // _COLUMNS)
     figure = new_figure(12.2, 6.8)
     left, right = figure.subfigures(1, 2, width_ratios=(1.25, 1.0))
@@ -48,7 +48,7 @@ def draw_areas(
     for panel in panels.flat[len(angles) :]:
         panel.set_visible(False)
     for panel, angle in zip(panels.flat, angles, strict=False):
-        own = [s for s in sightings if s.clockwise_deg == angle and (s.u_m, s.v_m) in kept]
+        own = [s for s in samples if s.clockwise_deg == angle and (s.u_m, s.v_m) in kept]
         _single(panel, own, angle, body_m, edge_m)
     for panel in panels[-1]:
         panel.set_xlabel("u (cm)", fontsize=8)
@@ -100,16 +100,16 @@ def _overlaid(axes: Any, places: Iterable[Overlay], body_m: tuple[float, float],
 
 
 def _single(
-    panel: Any, sightings: Sequence[Sighting], angle: float, body_m: tuple[float, float], edge_m: float
+    panel: Any, samples: Sequence[CameraSample], angle: float, body_m: tuple[float, float], edge_m: float
 ) -> None:
-    size = _cell(sightings)
-    for sighting in sightings:
-        _fill(panel, sighting.u_m, sighting.v_m, size, kinds_of(sighting), attainable=sighting.attainable)
+    size = _cell(samples)
+    for sample in samples:
+        _fill(panel, sample.u_m, sample.v_m, size, kinds_of(sample), attainable=sample.attainable)
     _neighbour(panel, body_m, edge_m)
-    _frame(panel, sightings)
+    _frame(panel, samples)
     # The camera looks to the follower's left: against u, turned by the angle.
     turn = np.radians(angle)
-    edge = max(s.u_m for s in sightings) * _CM
+    edge = max(s.u_m for s in samples) * _CM
     panel.annotate(
         "",
         (-0.62 * edge - 0.3 * edge * np.cos(turn), 0.72 * edge + 0.3 * edge * np.sin(turn)),
@@ -156,7 +156,7 @@ def _neighbour(axes: Any, body_m: tuple[float, float], edge_m: float) -> None:
         axes.plot(*ends, color=_MARKER[name], linewidth=2.5, solid_capstyle="butt", zorder=5)
 
 
-def _frame(axes: Any, items: Sequence[Overlay] | Sequence[Sighting]) -> None:
+def _frame(axes: Any, items: Sequence[Overlay] | Sequence[CameraSample]) -> None:
     edge = max(item.u_m for item in items) * _CM + _cell(items) / 2.0
     axes.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal")
     ticks = [tick for tick in (-40, -20, 0, 20, 40) if abs(tick) < edge]
@@ -164,7 +164,7 @@ def _frame(axes: Any, items: Sequence[Overlay] | Sequence[Sighting]) -> None:
     axes.set_yticks(ticks)
 
 
-def _cell(items: Sequence[Overlay] | Sequence[Sighting]) -> float:
+def _cell(items: Sequence[Overlay] | Sequence[CameraSample]) -> float:
     """Distance of neighbouring positions, cm."""
     axis = sorted({item.u_m for item in items})
     return float(np.diff(axis).min()) * _CM if len(axis) > 1 else 5.0

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from robot_formation.analysis.drawing import new_figure, save_figure
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.control.vision_fit import WINDOW_M, CameraFit, FaceView, difference_px
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
 _CM = 100.0
 # Blue, orange and green as in the paper's figure, then further ones; from Okabe and Ito's palette.

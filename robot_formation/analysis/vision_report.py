@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from robot_formation.control.camera_samples import CameraSample, Overlay, overlay
 from robot_formation.control.edge_bias import EdgeBias
-from robot_formation.control.motion import FORMATION_DISTANCE_M
-from robot_formation.control.sightings import Overlay, Sighting, overlay
 from robot_formation.control.vision_fit import (
     WINDOW_M,
     CameraFit,
@@ -19,6 +18,7 @@ from robot_formation.control.vision_fit import (
     difference_px,
     pan_distances,
 )
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
 _SYMBOLS = {
     "unattainable": "#",
@@ -39,14 +39,14 @@ _DIFFERENT = "?"
 class VisionResult:
     """All that a calibration has found."""
 
-    sightings: Sequence[Sighting]
+    samples: Sequence[CameraSample]
     views: Sequence[FaceView]
     fit: CameraFit
     edges: Mapping[str, EdgeBias]
 
     def grid(self) -> list[Overlay]:
         """List the positions of the grid: those that were looked at under the most angles."""
-        places = overlay(self.sightings)
+        places = overlay(self.samples)
         most = max(place.angles for place in places)
         return [place for place in places if place.angles == most]
 
@@ -73,13 +73,13 @@ class VisionResult:
 def vision_text(result: VisionResult) -> str:
     """Return the map of the areas and the curves' figures."""
     fit = result.fit
-    looked = [s for s in result.sightings if s.attainable]
+    looked = [s for s in result.samples if s.attainable]
     distances, compared = result.distances()
     left, right = fit.window_px()
     side = float(fit.side(FORMATION_DISTANCE_M))
     per_cm = float(fit.side(FORMATION_DISTANCE_M - 0.005) - fit.side(FORMATION_DISTANCE_M + 0.005))
     lines = [
-        f"{len(result.sightings)} poses, {len(looked)} attainable, {sum(bool(s.blocks) for s in looked)} with blocks",
+        f"{len(result.samples)} poses, {len(looked)} attainable, {sum(bool(s.blocks) for s in looked)} with blocks",
         "",
         *_map(result.grid()),
         "",
@@ -124,9 +124,9 @@ def vision_json(result: VisionResult) -> dict[str, Any]:
     grid = result.grid()
     return {
         "looks": {
-            "poses": len(result.sightings),
-            "attainable": sum(s.attainable for s in result.sightings),
-            "with_blocks": sum(bool(s.blocks) for s in result.sightings),
+            "poses": len(result.samples),
+            "attainable": sum(s.attainable for s in result.samples),
+            "with_blocks": sum(bool(s.blocks) for s in result.samples),
         },
         "areas": dict(sorted(Counter(place.area for place in grid).items())),
         "positions": [

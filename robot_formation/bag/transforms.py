@@ -7,7 +7,6 @@ frames of the same names.
 
 from __future__ import annotations
 
-import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
@@ -17,6 +16,7 @@ from typing import Any, NamedTuple
 
 from robot_formation import names
 from robot_formation.bag.definitions import jazzy_typestore
+from robot_formation.geometry.orientation import quaternion
 
 _POSES = re.compile(r"(.*)/ground_truth/([^/]+)/odom")
 _DESCRIPTIONS = re.compile(r"(.*)/([^/]+)/robot_description")
@@ -113,7 +113,7 @@ def _of_description(robot: str, text: str) -> Iterator[Any]:
             types["builtin_interfaces/msg/Time"](0, 0), f"{robot}/{parent.get('link', '')}"
         )
         transform = types["geometry_msgs/msg/Transform"](
-            types["geometry_msgs/msg/Vector3"](*place), types["geometry_msgs/msg/Quaternion"](*_quaternion(*turn))
+            types["geometry_msgs/msg/Vector3"](*place), types["geometry_msgs/msg/Quaternion"](*quaternion(*turn))
         )
         yield _transform(header, f"{robot}/{child.get('link', '')}", transform)
 
@@ -121,19 +121,6 @@ def _of_description(robot: str, text: str) -> Iterator[Any]:
 def _vector(text: str) -> Vector:
     x, y, z = (float(number) for number in text.split())
     return (x, y, z)
-
-
-def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """Unit quaternion (x, y, z, w) of URDF's fixed-axis roll, pitch, yaw."""
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
 
 
 def _transform(header: Any, child: str, transform: Any) -> Any:

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.cli.calibrate_vision import DESCRIPTION as VISION_DESCRIPTION
 from robot_formation.cli.calibrate_vision import add_options as add_vision_options
 from robot_formation.cli.calibrate_vision import run_vision
+from robot_formation.cli.calibration_options import build_scenario, free_folder
 from robot_formation.cli.parser import whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.experiment.calibration_course import Course
+    from robot_formation.experiment.calibration_rig import CalibrationRig
     from robot_formation.experiment.scenario import Scenario
 
 DESCRIPTION = "Measure the robots of a scenario, each alone in the middle of the plate, or the follower's camera."
@@ -102,14 +103,14 @@ def run_motors(args: argparse.Namespace) -> int:
     from robot_formation.control.calibration import MotorCalibration, save_calibration
     from robot_formation.control.drive import DriveParameters
     from robot_formation.experiment.calibration_motors import calibrate_motors, curves
-    from robot_formation.experiment.drive_curves import robot_facts
+    from robot_formation.experiment.drive_check import robot_facts
     from robot_formation.parameters import from_mapping
 
     scenario = build_scenario(args, with_curves=False)
     folder = free_folder(args, scenario, (CALIBRATION_FILE, MOTORS_PICTURE))
     drive = from_mapping(DriveParameters, scenario.parameters("drive"), where="drive")
-    course = make_course(args, scenario)
-    fits = calibrate_motors(course, scenario.robots, drive, args.repeats, _say)
+    rig = make_rig(args, scenario)
+    fits = calibrate_motors(rig, scenario.robots, drive, args.repeats, _say)
     conditions = {**_conditions(args, scenario), **robot_facts(scenario)}
     save_calibration(folder / CALIBRATION_FILE, MotorCalibration(curves(fits).robots, conditions))
     picture = draw_motors(fits, f"Motor calibration · {_told(args, scenario)}", folder / MOTORS_PICTURE)
@@ -135,7 +136,7 @@ def run_encoders(args: argparse.Namespace) -> int:
     from robot_formation.control.distance_comparison import compare_distances
     from robot_formation.control.drive import DriveParameters
     from robot_formation.experiment.calibration_encoders import measure_encoders
-    from robot_formation.experiment.drive_curves import describe_curves
+    from robot_formation.experiment.drive_check import describe_curves
     from robot_formation.parameters import from_mapping, suggestion
 
     scenario = build_scenario(args, with_curves=True)
@@ -144,8 +145,8 @@ def run_encoders(args: argparse.Namespace) -> int:
     folder = free_folder(args, scenario, (ENCODERS_PICTURE,))
     drive = from_mapping(DriveParameters, scenario.parameters("drive"), where="drive")
     _say(describe_curves(scenario))
-    course = make_course(args, scenario)
-    comparisons = compare_distances(measure_encoders(course, args.robot, drive, args.repeats, _say))
+    rig = make_rig(args, scenario)
+    comparisons = compare_distances(measure_encoders(rig, args.robot, drive, args.repeats, _say))
     title = f"{args.robot.replace('_', ' ')}, travelled distances · {_told(args, scenario)}"
     picture = draw_encoders(comparisons, title, folder / ENCODERS_PICTURE)
     if args.json:
@@ -157,74 +158,14 @@ def run_encoders(args: argparse.Namespace) -> int:
     return 0
 
 
-def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
-    """Put the scenario together whose robots are measured, on the ground to measure on.
-
-    Without curves, the calibration files that it names are left out: they may be what is to be measured only now.
-
-    Raises:
-        FormationError: naming what is misspelt or out of range.
-    """
-    from robot_formation.experiment import scenario as scenarios
-
-    file, track = args.scenario, "two" if args.track is None else args.track
-    scenario = scenarios.load(file) if file is not None else scenarios.load_track(track)
-    scenario = scenarios.with_surface(scenario, args.surface)
-    if args.seed is not None:
-        scenario = scenarios.with_option(scenario, "seed", args.seed, "--seed")
-    scenario = scenarios.override(scenario, args.set)
-    if not with_curves:
-        for node in ("drive", "fine_tuner"):
-            scenario = scenarios.with_value(scenario, f"{node}.calibration_file", "")
-    scenario.check()
-    return scenario
-
-
-def make_course(args: argparse.Namespace, scenario: Scenario) -> Course:
-    """Make the course of the scenario's ground and robots."""
+def make_rig(args: argparse.Namespace, scenario: Scenario) -> CalibrationRig:
+    """Make the calibration rig of the scenario's ground and robots."""
     from robot_formation.components.catalogue import KINDS
-    from robot_formation.experiment.calibration_course import Course
+    from robot_formation.experiment.calibration_rig import CalibrationRig
     from robot_formation.parameters import from_mapping
 
     world = from_mapping(KINDS["world"].parameter_class(), scenario.parameters("world"), where="world")
-    return Course(world.make_surface(), world, scenario.setup.seed, args.reference_noise)
-
-
-def free_folder(args: argparse.Namespace, scenario: Scenario, files: tuple[str, ...]) -> Path:
-    """Make the output folder.
-
-    Raises:
-        FormationError: if one of the files is there already and --force isn't given, or the folder can't be made.
-    """
-    folder = _folder_name(args, scenario)
-    for name in files:
-        if (folder / name).exists() and not args.force:
-            raise FormationError(
-                f"{folder / name} exists already and is not overwritten; choose another folder with --out, or "
-                "replace it with --force"
-            )
-    return output_folder(args, scenario)
-
-
-def output_folder(args: argparse.Namespace, scenario: Scenario) -> Path:
-    """Make the output folder, whatever is in it.
-
-    Raises:
-        FormationError: if it can't be made.
-    """
-    folder = _folder_name(args, scenario)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FormationError(f"{folder} can't be made: {error.strerror}; choose another folder with --out") from error
-    return folder
-
-
-def _folder_name(args: argparse.Namespace, scenario: Scenario) -> Path:
-    from robot_formation.paths import default_calibrations_dir
-
-    folder: Path = args.out or default_calibrations_dir() / f"{scenario.setup.name}_seed{scenario.setup.seed}"
-    return folder
+    return CalibrationRig(world.make_surface(), world, scenario.setup.seed, args.reference_noise)
 
 
 def _conditions(args: argparse.Namespace, scenario: Scenario) -> dict[str, Any]:

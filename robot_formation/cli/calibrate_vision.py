@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.cli.calibration_options import build_scenario, output_folder
 from robot_formation.cli.parser import number, whole_number
 from robot_formation.cli.sweep import with_progress
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
     from robot_formation.analysis.vision_report import VisionResult
-    from robot_formation.control.sightings import Sighting
+    from robot_formation.control.camera_samples import CameraSample
     from robot_formation.experiment.scenario import Scenario
     from robot_formation.experiment.vision_grid import Conditions, Position
 
@@ -49,7 +50,6 @@ def run_vision(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments or the folder, or if the curves can't be fitted.
     """
-    from robot_formation.cli.calibrate import build_scenario, output_folder
     from robot_formation.experiment.calibration_vision import BAG_NAME, conditions_of, record_of
     from robot_formation.experiment.vision_grid import positions
     from robot_formation.experiment.vision_table import RECORD_NAME, TABLE_NAME, VisionTable
@@ -83,12 +83,12 @@ def _look(table: Any, places: list[Position], conditions: Conditions, jobs: int)
         done = len(places) - len(todo)
         print(f"{table.path}: {done} positions are there already, {len(todo)} are left", file=sys.stderr)
     found = carry_out(todo, conditions, min(jobs, len(todo)))
-    for sightings in with_progress(found, len(todo), "positions"):
-        table.add(sightings)
+    for samples in with_progress(found, len(todo), "positions"):
+        table.add(samples)
 
 
 def _evaluate(
-    scenario: Scenario, conditions: Conditions, sightings: list[Sighting], folder: Path, step_m: float
+    scenario: Scenario, conditions: Conditions, samples: list[CameraSample], folder: Path, step_m: float
 ) -> VisionResult:
     """Write bag, pictures and calibration; the curves come last because they may not be found."""
     from robot_formation.analysis.vision_areas_figure import draw_areas
@@ -99,21 +99,21 @@ def _evaluate(
     from robot_formation.control.vision_calibration import VisionCalibration, save_vision
     from robot_formation.control.vision_fit import face_views, fit_camera
     from robot_formation.experiment.calibration_vision import BAG_NAME, record_of, write_bag
-    from robot_formation.experiment.camera_facts import camera_facts
+    from robot_formation.experiment.camera_check import camera_facts
     from robot_formation.experiment.vision_grid import true_faces
 
     bag = folder / BAG_NAME
     if not bag.exists():
         shutil.rmtree(bag.with_name(BAG_NAME + PARTIAL_SUFFIX), ignore_errors=True)  # of a run that was stopped
         metadata = {"calibration": "vision", "conditions": json.dumps(record_of(scenario, step_m))}
-        write_bag(bag, sightings, conditions, metadata)
+        write_bag(bag, samples, conditions, metadata)
     world, told = conditions.world, _told(scenario)
     edge = world.marker.edge_m
     body = (world.chassis.length_m, world.chassis.width_m)
-    draw_areas(sightings, body, edge, f"Blocks around the beacon neighbour · {told}", folder / PICTURES["areas"])
-    views = face_views(sightings)
-    edges = edge_biases((sighting, true_faces(world, sighting)) for sighting in sightings if sighting.blocks)
-    result = VisionResult(sightings, views, fit_camera(views, edge), edges)
+    draw_areas(samples, body, edge, f"Blocks around the beacon neighbour · {told}", folder / PICTURES["areas"])
+    views = face_views(samples)
+    edges = edge_biases((sample, true_faces(world, sample)) for sample in samples if sample.blocks)
+    result = VisionResult(samples, views, fit_camera(views, edge), edges)
     measured_with = {"seed": scenario.setup.seed, "surface": world.surface, "step_m": step_m, **camera_facts(scenario)}
     save_vision(folder / CALIBRATION_FILE, VisionCalibration(result.fit.alignment(), measured_with))
     distances, compared = result.distances()

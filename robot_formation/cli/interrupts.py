@@ -5,6 +5,7 @@ Imports only what Python has loaded already, since it has to be at work before a
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import io
 import os
@@ -112,3 +113,11 @@ def _wrapped(stream: Any, descriptor: int, gone: tuple[str, ...]) -> io.TextIOWr
         errors=stream.errors if stream is not None else "backslashreplace",
         line_buffering=descriptor == 2 or os.isatty(descriptor) or bool(os.environ.get("PYTHONUNBUFFERED")),
     )
+
+
+def forget_output() -> None:
+    """Send the rest of standard output nowhere: its reader (head, less) has gone, and Python would complain at exit."""
+    with contextlib.suppress(OSError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
 import sys
 from collections.abc import Sequence
 
@@ -27,6 +25,7 @@ from robot_formation.cli import (
     teach,
     test,
 )
+from robot_formation.cli.interrupts import forget_output
 from robot_formation.cli.parser import Parser
 from robot_formation.errors import FormationError
 
@@ -74,17 +73,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"formation {args.verb}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
         return exit_codes.BAD_INPUT
-
-
-def forget_output() -> None:
-    """Send the rest of standard output nowhere: its reader (head, less) has gone, and Python would complain at exit."""
-    with contextlib.suppress(OSError):
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)
-
-
-if __name__ == "__main__":
-    from robot_formation.cli.__main__ import main as process
-
-    raise SystemExit(process())

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.errors import FormationError, shown
 
 if TYPE_CHECKING:
-    from robot_formation.control.motion import Motion
     from robot_formation.experiment.recording import Recording
     from robot_formation.experiment.replay import DetectionReplay, PredictionReplay
     from robot_formation.experiment.replay_fine_tuner import Decisions, FineTunerReplay
+    from robot_formation.geometry.se2 import Motion
 
 DESCRIPTION = """\
 Run what a bag holds through today's code again and show what would have changed: displacements through the predictor

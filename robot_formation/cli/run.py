@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
             sys.stdout.flush()
             return result.exit_code
     except BrokenPipeError:
-        from robot_formation.cli.main import forget_output
+        from robot_formation.cli.interrupts import forget_output
 
         forget_output()
         return result.exit_code
@@ -144,8 +144,8 @@ def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
 
 def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation) -> RunResult:
     """Run the scenario in the way that the options ask for."""
-    from robot_formation.experiment.camera_facts import describe_camera
-    from robot_formation.experiment.drive_curves import describe_curves
+    from robot_formation.experiment.camera_check import describe_camera
+    from robot_formation.experiment.drive_check import describe_curves
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)

@@ -9,8 +9,9 @@ from typing import Any
 from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.control import fine_tuner as core
-from robot_formation.control.motion import Motion
+from robot_formation.control.alignment_state import State
 from robot_formation.control.vision_calibration import calibrated
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 
 
@@ -97,8 +98,8 @@ class FineTunerComponent(Component):
                     self._report(action)
                 case core.Done(timestep):
                     self._send(self._done, conversions.uint32(timestep))
-                case core.State(text):
-                    self._send(names.ALIGNMENT, conversions.string(text))
+                case State():
+                    self._send(names.ALIGNMENT, conversions.string(action.text))
                 case core.Warn(text):
                     self.warn(text)
                 case core.Lost():

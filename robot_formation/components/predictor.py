@@ -11,8 +11,8 @@ import numpy as np
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
-from robot_formation.control.motion import Motion
 from robot_formation.files import MOST_RECORD_BYTES, read_file
+from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
 
 _MOST_UNPAIRED = 16  # timesteps of which not all parts have come: in a run, one at a time
@@ -73,18 +73,18 @@ class PredictorComponent(Component):
 
     def details(self) -> dict[str, str]:
         """See `Component`."""
-        insight = self._predictor.insight()
+        diagnostics = self._predictor.diagnostics()
         values = {"predictor": self._predictor.name, "timesteps": str(self._predictor.observations)}
         for name, array in (
-            ("K", insight.k),
-            ("eigenvalues", insight.eigenvalues),
-            ("innovation [m]", insight.innovation),
+            ("K", diagnostics.k),
+            ("eigenvalues", diagnostics.eigenvalues),
+            ("innovation [m]", diagnostics.innovation),
         ):
             if array is not None:
                 values[name] = np.array2string(array, precision=6, separator=", ").replace("\n", "")
-        values.update(insight.notes or {})
-        if insight.condition_number is not None:
-            values["condition number"] = f"{insight.condition_number:.4g}"
+        values.update(diagnostics.notes or {})
+        if diagnostics.condition_number is not None:
+            values["condition number"] = f"{diagnostics.condition_number:.4g}"
         return values
 
     def actuation_bias(self) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
@@ -82,7 +82,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class Box:
-    """Hull of the blocks of one signature: inclusive edges in pixels."""
+    """Bounding box of the blocks of one signature: inclusive edges in pixels."""
 
     left: float
     right: float
@@ -110,8 +110,8 @@ class Box:
         return max(self.width, self.height)
 
 
-def hulls(blocks: Iterable[Block]) -> dict[int, Box]:
-    """Merge the blocks of each marker signature into their hull (a face split by flicker counts once)."""
+def bounding_boxes(blocks: Iterable[Block]) -> dict[int, Box]:
+    """Merge the blocks of each marker signature into their bounding box (a face split by flicker counts once)."""
     boxes: dict[int, Box] = {}
     for block in blocks:
         if block.signature not in (TARGET, FRONT, REAR):
@@ -145,7 +145,7 @@ class PaperAlignment:
 
     def offset(self, blocks: Iterable[Block]) -> Motion | None:
         """Estimate the way to the formation position in the follower's frame, or None without a Target block."""
-        target = hulls(blocks).get(TARGET)
+        target = bounding_boxes(blocks).get(TARGET)
         if target is None:
             return None
         side = max(target.side + self._p.side_bias_px, 1.0)
@@ -157,7 +157,7 @@ class PaperAlignment:
     def assess(self, blocks: Iterable[Block]) -> Decision:
         """Decide what the last look calls for."""
         blocks = list(blocks)
-        boxes = hulls(blocks)
+        boxes = bounding_boxes(blocks)
         if not boxes:
             self._empty_looks += 1
             lost = self._empty_looks >= self._p.max_empty_looks

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from robot_formation.control.alignment import AlignmentParameters, Decision, PaperAlignment
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.vision.block import Block
 
 Frames = Sequence[Sequence[Block]]

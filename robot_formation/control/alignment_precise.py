@@ -6,31 +6,31 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from robot_formation.control.actuation_model import ActuationModel
 from robot_formation.control.alignment import TARGET, Box, Decision, Verdict
 from robot_formation.control.alignment_modes import Frames
-from robot_formation.control.approach import FORMATION, Approach, ApproachParameters, legs, way_to
-from robot_formation.control.drive_experience import DriveExperience
-from robot_formation.control.leader_search import LeaderSearch, SearchParameters
 from robot_formation.control.marker_view import EdgeParameters, mean_boxes
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.control.motion_planner import FORMATION, MotionPlanner, PlannerParameters, count_legs
+from robot_formation.control.neighbour_search import NeighbourSearch, SearchParameters
 from robot_formation.control.pose_filter import FilterParameters, PoseFilter
-from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y, after_motion
+from robot_formation.control.relative_pose import GeometryParameters, MarkerModel, Vector, X, Y, after_motion, pose_of
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.parameters import parameter
 
-_SURPRISE = 6.0
-"""Mean square of a look's innovations by their scatter from which on something is in the way."""
-_VANTAGES_M = (0.135, -0.135, 0.135, -0.12, 0.12)
+_IMPLAUSIBLE_NIS = 6.0
+"""NIS of a look from which on it is taken not to show the whole marker."""
+_VIEWPOINTS_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
-_VANTAGE_BESIDE_M = 0.312
-_VANTAGE_NEAR = Motion(0.02, 0.02, math.radians(6.0))
+_VIEWPOINT_BESIDE_M = 0.312
+_VIEWPOINT_TOLERANCE = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
 _SPARE_MOVES = 2
 """Moves left over for last corrections."""
 _ENOUGH_MOVES = 6
 """As long as so many are left, the way back isn't counted."""
-_TRIFLE, _FIRST_TRIFLE = 0.8, 0.5
+_DEADBAND, _FIRST_DEADBAND = 0.8, 0.5
 """Share of the tolerance up to which an offset is left alone while the other axis is corrected; in timestep 0."""
-_CLUELESS_RAD = 0.08
+_UNKNOWN_HEADING_RAD = 0.08
 _ASIDE_RAD = 0.25
 _FIRST_SIDESTEP_SIGMA_M = 0.002
 
@@ -74,7 +74,7 @@ class PreciseParameters:
     geometry: GeometryParameters = GeometryParameters()
     edges: EdgeParameters = EdgeParameters()
     filter: FilterParameters = FilterParameters()
-    approach: ApproachParameters = ApproachParameters()
+    approach: PlannerParameters = PlannerParameters()
     search: SearchParameters = SearchParameters()
 
 
@@ -84,14 +84,14 @@ class PreciseAlignment:
     def __init__(self, parameters: PreciseParameters, first_step_m: float) -> None:
         self._p = parameters
         self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
-        self._approach = Approach(parameters.approach)
-        self._experience = DriveExperience()
-        self._search = LeaderSearch(parameters.search)
+        self._planner = MotionPlanner(parameters.approach)
+        self._actuation = ActuationModel()
+        self._search = NeighbourSearch(parameters.search)
         self._step_m = first_step_m
         self._moves = 0
         self._timestep = 0
         self._last = Motion()
-        self._vantages: list[float] | None = None  # those still to be visited; None: not chosen yet
+        self._viewpoints: list[float] | None = None  # those still to be visited; None: not chosen yet
 
     def restart(self, timestep: int) -> None:
         """Begin a timestep: the neighbour has made its step."""
@@ -100,27 +100,27 @@ class PreciseAlignment:
         self._last = Motion()
         if timestep > 0:
             self._filter.neighbour_stepped(
-                Motion(self._step_m, self._experience.slip * self._step_m),
-                self._experience.overshoot,
-                None if self._experience.drives else _FIRST_SIDESTEP_SIGMA_M,
+                Motion(self._step_m, self._actuation.slip * self._step_m),
+                self._actuation.overshoot,
+                None if self._actuation.drives else _FIRST_SIDESTEP_SIGMA_M,
             )
 
     def turn(self) -> float:
         """Tell the turn [rad] to make with the prediction move."""
         if not self._filter.known:
             return 0.0
-        heading = way_to(self._filter.best.state, FORMATION).yaw_rad
+        heading = pose_of(self._filter.best.state).then(FORMATION).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
 
     def moved(self, asked: Motion, motion: Motion) -> None:
         """Take a measured move."""
         self._filter.moved(motion)
-        self._experience.moved(asked, motion)
+        self._actuation.moved(asked, motion)
         self._last = motion
 
     def offset(self) -> Motion | None:
         """Estimate the way to the formation position in the follower's frame."""
-        return way_to(self._filter.best.state, FORMATION) if self._filter.known else None
+        return pose_of(self._filter.best.state).then(FORMATION) if self._filter.known else None
 
     def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
@@ -132,32 +132,32 @@ class PreciseAlignment:
             strange = False
         if not boxes or strange:
             decision = self._search.missed(self._last if self._moves else Motion(), self.offset())
-            self._moves += legs(decision.motion)
+            self._moves += count_legs(decision.motion)
             return decision
         self._search.found()
         first = not self._filter.known
         self._filter.look(boxes)
         if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
-            self._vantages = []
+            self._viewpoints = []
         return self._correct()
 
     def _correct(self) -> Decision:
         p, state = self._p, self._filter.best.state
         unsure = self._filter.yaw_sigma_rad > p.certain_rad
         motion, reason = Motion(), ""
-        if unsure and self._timestep == 0 and self._vantages != []:
+        if unsure and self._timestep == 0 and self._viewpoints != []:
             motion, reason = self._to_see_more(state)
         if motion == Motion():
-            if self._within(way_to(state, FORMATION)):
+            if self._within(pose_of(state).then(FORMATION)):
                 return Decision(Verdict.ALIGNED, reason="inside the tolerances")
             motion, reason = self._to_formation(state)
         if motion == Motion():
             return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
-        if self._moves + legs(motion) > p.max_moves:
+        if self._moves + count_legs(motion) > p.max_moves:
             return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
-        self._moves += legs(motion)
-        return Decision(Verdict.MOVE, self._experience.compensated(motion), reason)
+        self._moves += count_legs(motion)
+        return Decision(Verdict.MOVE, self._actuation.compensated(motion), reason)
 
     def _to_see_more(self, state: Vector) -> tuple[Motion, str]:
         """Choose the next motion to a place from where the heading shows; none if too few moves would be left."""
@@ -165,12 +165,12 @@ class PreciseAlignment:
         if motion != Motion():
             return motion, reason
         states = self._filter.likely()
-        for vantage in self._places(state):
-            motion = self._without_trifles(self._approach.next(states, vantage), _VANTAGE_NEAR)
+        for viewpoint in self._places(state):
+            motion = self._outside_deadband(self._planner.next(states, viewpoint), _VIEWPOINT_TOLERANCE)
             if motion == Motion():
                 continue
-            left = self._without_trifles(way_to(after_motion(state, motion), FORMATION), self._trifle())
-            needed = legs(motion) + self._approach.moves(left) + _SPARE_MOVES
+            left = self._outside_deadband(pose_of(after_motion(state, motion)).then(FORMATION), self._deadband())
+            needed = count_legs(motion) + self._planner.moves(left) + _SPARE_MOVES
             affordable = self._p.max_moves - self._moves >= min(needed, _ENOUGH_MOVES)
             return (motion, "to see two faces") if affordable else (Motion(), "")
         return Motion(), ""
@@ -180,21 +180,21 @@ class PreciseAlignment:
         motion, reason = self._first(state)
         if motion != Motion():
             return motion, reason
-        motion = self._approach.next(self._filter.likely(), FORMATION)
-        return self._without_trifles(motion, self._trifle()), "to the formation position"
+        motion = self._planner.next(self._filter.likely(), FORMATION)
+        return self._outside_deadband(motion, self._deadband()), "to the formation position"
 
     def _first(self, state: Vector) -> tuple[Motion, str]:
         """Choose what comes before any goal: to keep clear, and to face a marker whose heading is hardly known."""
         states = self._filter.likely()
-        if not self._approach.apart(state) and (away := self._approach.away(states)) != Motion():
+        if not self._planner.apart(state) and (away := self._planner.away(states)) != Motion():
             return away, "too close: away along u"
-        if self._filter.yaw_sigma_rad > _CLUELESS_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
-            return self._approach.face(states), "turn towards the marker"
+        if self._filter.yaw_sigma_rad > _UNKNOWN_HEADING_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
+            return self._planner.face(states), "turn towards the marker"
         return Motion(), ""
 
-    def _trifle(self) -> Motion:
+    def _deadband(self) -> Motion:
         p = self._p
-        share = _TRIFLE if self._timestep > 0 else _FIRST_TRIFLE * p.first_share
+        share = _DEADBAND if self._timestep > 0 else _FIRST_DEADBAND * p.first_share
         return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
 
     def _boxes(self, frames: Frames) -> dict[int, Box]:
@@ -203,7 +203,7 @@ class PreciseAlignment:
 
     def _strange(self, boxes: dict[int, Box]) -> bool:
         """Whether a look shows no whole marker, or one where none is expected."""
-        return not self._filter.whole(boxes) or (self._filter.known and self._filter.surprise(boxes) >= _SURPRISE)
+        return not self._filter.whole(boxes) or (self._filter.known and self._filter.nis(boxes) >= _IMPLAUSIBLE_NIS)
 
     def _placed(self, state: Vector) -> bool:
         return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m
@@ -218,24 +218,23 @@ class PreciseAlignment:
         )
 
     @staticmethod
-    def _without_trifles(motion: Motion, trifle: Motion) -> Motion:
+    def _outside_deadband(motion: Motion, deadband: Motion) -> Motion:
         """Leave out legs that are hardly worth a move."""
-        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-        x, y = c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m
-        yaw = motion.yaw_rad if abs(motion.yaw_rad) > trifle.yaw_rad else 0.0
-        x = x if abs(x) > trifle.x_m else 0.0
-        y = y if abs(y) > trifle.y_m else 0.0
-        c, s = math.cos(yaw), math.sin(yaw)
-        return Motion(c * x - s * y, s * x + c * y, yaw)
+        turn, forward, left = motion.legs
+        return Motion.from_legs(
+            turn if abs(turn) > deadband.yaw_rad else 0.0,
+            forward if abs(forward) > deadband.x_m else 0.0,
+            left if abs(left) > deadband.y_m else 0.0,
+        )
 
     def _places(self, state: Vector) -> Iterator[Motion]:
         """Yield the places left to look from, behind and ahead in turn; the one that is asked beyond is done with.
 
         The outer edges of Front and Rear are biased alike, so that the two sides' errors in heading cancel.
         """
-        if self._vantages is None:
-            behind = way_to(state, Motion()).x_m > 0.0
-            self._vantages = [-place if behind else place for place in _VANTAGES_M]
-        while self._vantages:
-            yield Motion(self._vantages[0], -_VANTAGE_BESIDE_M, 0.0)
-            self._vantages.pop(0)
+        if self._viewpoints is None:
+            behind = pose_of(state).x_m > 0.0
+            self._viewpoints = [-place if behind else place for place in _VIEWPOINTS_M]
+        while self._viewpoints:
+            yield Motion(self._viewpoints[0], -_VIEWPOINT_BESIDE_M, 0.0)
+            self._viewpoints.pop(0)

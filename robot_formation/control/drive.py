@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 
 WHEELS = ("front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel")
@@ -163,7 +163,7 @@ class Drive:
         p = self._parameters
         if not target.finite:
             return "refused a move that is not finite"
-        turn, forward, left = _leg_lengths(target)
+        turn, forward, left = target.legs
         for name, value, limit in (
             ("v", abs(forward), p.max_v_m),
             ("u", abs(left), p.max_u_m),
@@ -175,7 +175,7 @@ class Drive:
 
     def _plan(self, target: Motion) -> list[WheelCommand]:
         curves = self._parameters.calibration
-        turn, forward, left = _leg_lengths(target)
+        turn, forward, left = target.legs
         legs = []
         for axis, amount, curve in (
             ("yaw", turn, curves.turn),
@@ -208,9 +208,3 @@ class Drive:
             left * p.encoder_radius_m - yaw * p.encoder_u_offset_m,
             yaw,
         )
-
-
-def _leg_lengths(target: Motion) -> tuple[float, float, float]:
-    """Turn [rad], forward and left [m]: the turn comes first, so the others are expressed in the frame it leads to."""
-    cosine, sine = math.cos(target.yaw_rad), math.sin(target.yaw_rad)
-    return target.yaw_rad, cosine * target.x_m + sine * target.y_m, cosine * target.y_m - sine * target.x_m

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.control.alignment import FRONT, REAR, TARGET, Box, hulls
+from robot_formation.control.alignment import FRONT, REAR, TARGET, Box, bounding_boxes
+from robot_formation.control.camera_samples import CameraSample
 from robot_formation.control.marker_view import EdgeParameters
-from robot_formation.control.sightings import Sighting
 
 Corners = NDArray[np.float64]
 """Columns and rows (4, 2) of a face's corners, px: left top, left bottom, right top, right bottom as seen from outside;
@@ -34,7 +34,7 @@ class EdgeBias:
     scatter_px: float
 
 
-def edge_biases(looks: Iterable[tuple[Sighting, Mapping[int, Corners]]]) -> dict[str, EdgeBias]:
+def edge_biases(looks: Iterable[tuple[CameraSample, Mapping[int, Corners]]]) -> dict[str, EdgeBias]:
     """Compare reported with true edges, by the names of `EdgeParameters`.
 
     Args:
@@ -44,8 +44,8 @@ def edge_biases(looks: Iterable[tuple[Sighting, Mapping[int, Corners]]]) -> dict
         What was seen often enough to have a scatter.
     """
     found: dict[str, list[float]] = {}
-    for sighting, faces in looks:
-        for name, error in _errors(hulls(sighting.blocks), faces):
+    for sample, faces in looks:
+        for name, error in _errors(bounding_boxes(sample.blocks), faces):
             found.setdefault(name, []).append(error)
     return {
         name: EdgeBias(len(errors), float(np.mean(errors)), float(np.std(errors, ddof=1)))

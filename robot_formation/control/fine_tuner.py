@@ -14,7 +14,8 @@ from enum import Enum, auto
 from robot_formation.control.alignment import AlignmentParameters, Decision, Verdict
 from robot_formation.control.alignment_modes import AlignmentMode, PaperMode
 from robot_formation.control.alignment_precise import PreciseAlignment, PreciseParameters
-from robot_formation.control.motion import Motion
+from robot_formation.control.alignment_state import AlignmentState, State
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
@@ -92,13 +93,6 @@ class Done:
     """Tick: the follower has finished this timestep."""
 
     timestep: int
-
-
-@dataclass(frozen=True)
-class State:
-    """The alignment's state in a word, for people and for the bag."""
-
-    text: str
 
 
 @dataclass(frozen=True)
@@ -198,7 +192,7 @@ class FineTuner:
         self._resent += 1
         if self._resent > self._p.look.max_requests:
             self._phase = Phase.LOST
-            return [State("lost"), Warn("the camera gives no frames any more"), Lost()]
+            return [State(AlignmentState.LOST), Warn("the camera gives no frames any more"), Lost()]
         missing = self._frames_wanted - len(self._frames)
         return [Warn(f"{missing} frames of a look are missing: asked for again"), RequestFrames(missing)]
 
@@ -221,7 +215,7 @@ class FineTuner:
         self._displacement = Motion()
         self._actuation_error = None
         if self.timestep == 0:
-            return [State("align"), *self._look()]
+            return [State(AlignmentState.ALIGN), *self._look()]
         return self._go()
 
     def _go(self) -> list[Action]:
@@ -233,7 +227,10 @@ class FineTuner:
         self._planned_move = motion
         collecting = self.timestep <= COLLECTION_TIMESTEPS
         move = Motion(motion.x_m, motion.y_m, self._alignment.turn())
-        actions: list[Action] = [State("collect" if collecting else "predict"), *self._move(move)]
+        actions: list[Action] = [
+            State(AlignmentState.COLLECT if collecting else AlignmentState.PREDICT),
+            *self._move(move),
+        ]
         if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
             actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"))
         return actions
@@ -261,18 +258,19 @@ class FineTuner:
     def _decide(self, decision: Decision) -> list[Action]:
         if decision.verdict is Verdict.LOST:
             self._phase = Phase.LOST
-            return [State("lost"), Lost()]
+            return [State(AlignmentState.LOST), Lost()]
         if decision.verdict is Verdict.LOOK:
             self._out_of_view = True
-            return [State("hold"), *self._look()]
+            return [State(AlignmentState.HOLD), *self._look()]
         if decision.verdict is Verdict.SEARCH:
             self._out_of_view = True
-            return [State(f"search: {decision.reason}"), *self._move(decision.motion)]
-        actions: list[Action] = [State("reacquired")] if self._out_of_view else []
+            return [State(AlignmentState.SEARCH, decision.reason), *self._move(decision.motion)]
+        actions: list[Action] = [State(AlignmentState.REACQUIRED)] if self._out_of_view else []
         self._out_of_view = False
         if decision.verdict is Verdict.MOVE:
-            return [*actions, State(f"correct: {decision.reason}"), *self._move(decision.motion)]
-        actions.append(State(decision.verdict.value))
+            return [*actions, State(AlignmentState.CORRECT, decision.reason), *self._move(decision.motion)]
+        aligned = decision.verdict is Verdict.ALIGNED
+        actions.append(State(AlignmentState.ALIGNED if aligned else AlignmentState.UNALIGNED))
         if decision.verdict is Verdict.UNALIGNED:
             actions.append(Warn(decision.reason))
         if self.timestep == 0:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 
 

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from robot_formation.control.alignment import FRONT, REAR, TARGET, Box, hulls
+from robot_formation.control.alignment import FRONT, REAR, TARGET, Box, bounding_boxes
 from robot_formation.parameters import ParameterError, parameter
 from robot_formation.vision.block import Block
 
@@ -175,8 +175,8 @@ def one_marker(blocks: Iterable[Block], cost: Callable[[Block], float]) -> list[
 
 def mean_boxes(frames: Sequence[Sequence[Block]]) -> dict[int, Box]:
     """Average each face's box over the frames that report the faces which the last frame reports."""
-    last = set(hulls(frames[-1])) if frames else set()
-    groups = [boxes for boxes in map(hulls, frames) if set(boxes) == last]
+    last = set(bounding_boxes(frames[-1])) if frames else set()
+    groups = [boxes for boxes in map(bounding_boxes, frames) if set(boxes) == last]
     return {face: _mean([boxes[face] for boxes in groups]) for face in sorted(last)}
 
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET, Box
 from robot_formation.control.marker_view import EdgeParameters, View, one_marker, view
-from robot_formation.control.motion import Motion
 from robot_formation.control.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.control.relative_pose import (
     CURVATURE,
@@ -30,16 +29,17 @@ from robot_formation.control.relative_pose import (
     X,
     Y,
     after_motion,
-    leans,
+    relative_tilt,
 )
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.block import Block
 
 _KEPT_COST = 16.0
 _LIKELY_COST = 9.0
 _GATE_PX = 15.0
-_MOST_SURPRISE = 30.0
-_MISFIT_GAIN = 0.5
+_MOST_INFLATION = 30.0
+_NIS_GAIN = 0.5
 _HYPOTHESES = 50
 FACES = (TARGET, FRONT, REAR)
 
@@ -53,7 +53,7 @@ class FilterParameters:
     )
     curvature_drift_per_m: float = parameter(
         0.0015,
-        "Change of the curvatures with each step of the neighbour; more where steps surprise",
+        "Change of the curvatures with each step of the neighbour; more where the NIS after steps is high",
         unit="1/m",
         low=0.0,
         high=10.0,
@@ -81,18 +81,18 @@ class FilterParameters:
     )
     neighbour_sidestep_sigma_m: float = parameter(
         0.0005,
-        "How far the neighbour's step leads aside from its heading, least; more where steps surprise",
+        "How far the neighbour's step leads aside from its heading, least; more where the NIS after steps is high",
         unit="m",
         low=0.0,
         high=1.0,
     )
-    calm_misfit: float = parameter(
+    calm_nis: float = parameter(
         0.12,
-        "Misfit of the first look after a step, mean square by its expected scatter, up to which nothing surprises",
+        "Mean NIS of the first look after a step up to which the noise of the step model is not inflated",
         low=1e-4,
         high=100.0,
     )
-    slip_per_lean: float = parameter(
+    slip_per_tilt: float = parameter(
         0.76,
         "Sideways slip of a driving robot: share of its way per radian of lateral slope",
         unit="1/rad",
@@ -108,7 +108,7 @@ class FilterParameters:
     )
     turn_growth: float = parameter(
         28.0,
-        "Relative turn by slip on the way down: per way, lean and squared share by which drives go too far",
+        "Relative turn by slip on the way down: per way, tilt and squared share by which drives go too far",
         unit="1/(m rad)",
         low=0.0,
         high=1000.0,
@@ -127,7 +127,7 @@ class PoseFilter:
         self._looks = LookUpdate(model, edges)
         self._p = parameters
         self.hypotheses: list[Hypothesis] = []
-        self._misfit = 0.0
+        self._nis = 0.0
         self._stepped = False
 
     @property
@@ -205,28 +205,28 @@ class PoseFilter:
         """
         p = self._p
         overshoot = max(0.0, overshoot)
-        slip = p.slip_per_lean + p.slip_growth * overshoot**2
+        slip = p.slip_per_tilt + p.slip_growth * overshoot**2
         # What the ground does to a step is a model of the default world; where it fails, it counts for less.
-        surprise = min(_MOST_SURPRISE, max(1.0, self._misfit / p.calm_misfit))
-        sidestep = p.neighbour_sidestep_sigma_m * surprise if sidestep_sigma_m is None else sidestep_sigma_m
+        inflation = min(_MOST_INFLATION, max(1.0, self._nis / p.calm_nis))
+        sidestep = p.neighbour_sidestep_sigma_m * inflation if sidestep_sigma_m is None else sidestep_sigma_m
         self._stepped = True
         for hypothesis in self.hypotheses:
             state, covariance = hypothesis.state, hypothesis.covariance
             c, s = math.cos(state[YAW]), math.sin(state[YAW])
             along = np.array([[c, -s], [s, c]])
-            # The neighbour slips as the follower does, and by as much more as it leans more.
-            lean = float(leans(state[None])[0][0])
-            aside = step.y_m - slip * lean * abs(step.x_m)
+            # The neighbour slips as the follower does, and by as much more as it is tilted more.
+            tilt_rad = float(relative_tilt(state[None])[0][0])
+            aside = step.y_m - slip * tilt_rad * abs(step.x_m)
             jacobian = np.eye(SIZE)
             jacobian[:2, YAW] = along @ (-aside, step.x_m)
             hypothesis.state = state.copy()
             hypothesis.state[:2] += along @ (step.x_m, aside)
-            hypothesis.state[YAW] += p.turn_growth * overshoot**2 * lean * abs(step.x_m)
+            hypothesis.state[YAW] += p.turn_growth * overshoot**2 * tilt_rad * abs(step.x_m)
             noise = np.zeros((SIZE, SIZE))
             noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, sidestep**2]) @ along.T
             noise[YAW, YAW] = p.neighbour_turn_sigma_rad**2
             for part in (CURVATURE, SADDLE, SKEW):
-                noise[part, part] = (p.curvature_drift_per_m * surprise) ** 2
+                noise[part, part] = (p.curvature_drift_per_m * inflation) ** 2
             hypothesis.covariance = jacobian @ covariance @ jacobian.T + noise
 
     # --- looks ------------------------------------------------------------------------------------------------------
@@ -234,7 +234,7 @@ class PoseFilter:
     def look(self, boxes: dict[int, Box]) -> None:
         """Take a look's boxes, at least one."""
         if self._stepped and self.hypotheses:
-            self._misfit += _MISFIT_GAIN * (self.surprise(boxes) - self._misfit)
+            self._nis += _NIS_GAIN * (self.nis(boxes) - self._nis)
         self._stepped = False
         if not self.hypotheses:
             self.hypotheses = self._guesses(boxes)
@@ -267,9 +267,9 @@ class PoseFilter:
         low, high = corners.min(axis=0) - gate, corners.max(axis=0) + gate
         return bool(low[0] <= block.x <= high[0] and low[1] <= block.y <= high[1])
 
-    def surprise(self, boxes: dict[int, Box]) -> float:
-        """Tell how badly a look fits: squared innovation by its expected scatter, per edge."""
-        return self._looks.surprise(self.hypotheses, view(boxes, self._edges))
+    def nis(self, boxes: dict[int, Box]) -> float:
+        """Normalised innovation squared (NIS) of a look, per edge; 1 is expected of a consistent filter."""
+        return self._looks.nis(self.hypotheses, view(boxes, self._edges))
 
     def whole(self, boxes: dict[int, Box]) -> bool:
         """Whether a look's boxes, at least one, fit together for some pose: not those of a partly covered marker."""

@@ -14,7 +14,7 @@ from robot_formation.control.relative_pose import SIZE, YAW, MarkerModel, Matrix
 
 _ITERATIONS = 6
 _STRAY_SIGMAS = 1.5
-_MISFIT, _MISFIT_SIGMAS = 9.0, 2.5
+_WORST_RESIDUALS, _OUTLIER_SIGMAS = 9.0, 2.5
 """Squared residuals of a look's edges from which on the marker isn't seen whole; where they begin to grow less."""
 _BORDER_PX = 8.0
 """Of a face that the picture cuts off, so much more must show before it is always reported."""
@@ -77,10 +77,10 @@ class LookUpdate:
     def fits(self, guess: Hypothesis, seen: View) -> bool:
         """Whether a look fits a pose near a guess, which is updated in place."""
         self.update(guess, seen)
-        return guess.sane and self._residuals(guess.state, seen) < _MISFIT
+        return guess.sane and self._residuals(guess.state, seen) < _WORST_RESIDUALS
 
-    def surprise(self, hypotheses: Sequence[Hypothesis], seen: View) -> float:
-        """Tell how badly a look fits the best of them: squared innovation by its expected scatter, per edge."""
+    def nis(self, hypotheses: Sequence[Hypothesis], seen: View) -> float:
+        """Normalised innovation squared (NIS) of a look by the best hypothesis, per edge."""
         if not seen.edges:
             return 0.0
         costs = []
@@ -97,7 +97,7 @@ class LookUpdate:
             return 0.0
         predicted = self._linearise(state, edges)[1]
         ratios = (np.array([edge.position_px for edge in edges]) - predicted) / [edge.sigma_px for edge in edges]
-        strays = np.maximum(1.0, np.abs(ratios) / _MISFIT_SIGMAS)
+        strays = np.maximum(1.0, np.abs(ratios) / _OUTLIER_SIGMAS)
         return float(np.sum(ratios**2 / strays)) + self._contradiction(state, seen)
 
     def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:

@@ -1,8 +1,9 @@
 """Where the beacon neighbour stands as its follower sees it, and which picture of the marker that gives.
 
 Both robots stand on curved ground. Their origins are taken to lie in one plane halfway between their tilts (a chord of
-the ground): the follower leans by half of the relative tilt one way, its neighbour by half of it the other way. So the
-lean is told by the rows of the picture, and distances are those between the origins, as the formation error's are.
+the ground): the follower is tilted by half of the relative tilt one way, its neighbour by half of it the other way. So
+the relative tilt follows from the rows of the picture, and distances are those between the origins, as the formation
+error's are.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from robot_formation.control.alignment import FRONT, REAR, TARGET
 from robot_formation.control.marker_view import Edge
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 
 Vector = NDArray[np.float64]
@@ -24,7 +25,7 @@ Matrix = NDArray[np.float64]
 
 X, Y, YAW, CURVATURE, SADDLE, SKEW = range(6)
 """State of the neighbour in the follower's level frame: x, y [m], yaw [rad]; the ground's curvature [1/m], by which the
-robots lean towards each other: its mean, half of what it is more along y than along x, and its mixed part."""
+robots are tilted towards each other: its mean, half of what it is more along y than along x, and its mixed part."""
 SIZE = 6
 
 _CORNERS = {
@@ -80,7 +81,7 @@ class MarkerModel:
         cosine, sine = np.cos(states[:, YAW])[:, None], np.sin(states[:, YAW])[:, None]
         cx, cy, cz = self._corners.T
         points = np.stack([cosine * cx - sine * cy, sine * cx + cosine * cy, np.broadcast_to(cz, (len(states), 8))], -1)
-        roll, pitch = leans(states)
+        roll, pitch = relative_tilt(states)
         half = _tilts(0.5 * roll, 0.5 * pitch)
         points = np.einsum("nij,nkj->nki", half, points)
         points[:, :, :2] += states[:, None, :2]
@@ -135,8 +136,8 @@ class MarkerModel:
         return np.array([x, y, yaw, 0.0, 0.0, 0.0])
 
 
-def leans(states: Matrix) -> tuple[Vector, Vector]:
-    """Tell the neighbour's roll and pitch against the follower [rad], each (n,), for states (n, 6).
+def relative_tilt(states: Matrix) -> tuple[Vector, Vector]:
+    """Return the neighbour's roll and pitch relative to the follower [rad], each (n,), for states (n, 6).
 
     On a surface z = p^T S p / 2 about the follower, with S symmetric, the slopes at p are S p.
     """
@@ -155,17 +156,14 @@ def _tilts(roll: Vector, pitch: Vector) -> Matrix:
 
 
 def after_motion(state: Vector, motion: Motion) -> Vector:
-    """Tell the state after the follower's motion."""
-    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-    dx, dy = state[X] - motion.x_m, state[Y] - motion.y_m
+    """Return the state after the follower's motion."""
+    pose = pose_of(state).relative_to(motion)
     c2, s2 = math.cos(2.0 * motion.yaw_rad), math.sin(2.0 * motion.yaw_rad)
     more, mixed = state[SADDLE], state[SKEW]
     ground = [state[CURVATURE], c2 * more - s2 * mixed, c2 * mixed + s2 * more]
-    return np.array([c * dx + s * dy, c * dy - s * dx, state[YAW] - motion.yaw_rad, *ground])
+    return np.array([pose.x_m, pose.y_m, pose.yaw_rad, *ground])
 
 
-def way_to_formation(state: Vector) -> Motion:
-    """Tell the motion of the follower that brings it beside its neighbour."""
-    c, s = math.cos(state[YAW]), math.sin(state[YAW])
-    d = FORMATION_DISTANCE_M
-    return Motion(float(state[X] + s * d), float(state[Y] - c * d), float(state[YAW]))
+def pose_of(state: Vector) -> Motion:
+    """Return the neighbour's pose in the follower's level frame."""
+    return Motion(float(state[X]), float(state[Y]), float(state[YAW]))

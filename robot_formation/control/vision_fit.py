@@ -1,4 +1,4 @@
-"""From sightings to the curves of the paper's fine-tuning: pan (column against v) and side length against u.
+"""From samples to the curves of the paper's fine-tuning: pan (column against v) and side length against u.
 
 Both are views of one face by one camera, so they are fitted together. With the follower's place (u, v), parallel to
 its neighbour, and q = distance / (u - u_formation + distance), which is 1 in formation:
@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.control.alignment import TARGET, Box, hulls
+from robot_formation.control.alignment import TARGET, Box, bounding_boxes
 from robot_formation.control.calibration import CalibrationError
-from robot_formation.control.motion import FORMATION_DISTANCE_M
-from robot_formation.control.sightings import Sighting
+from robot_formation.control.camera_samples import CameraSample
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
 Floats = NDArray[np.float64]
 
@@ -48,9 +48,9 @@ class FaceView:
     """The whole Target face from a follower that is parallel to its neighbour.
 
     Attributes:
-        u_m: as in `Sighting`.
-        v_m: as in `Sighting`.
-        box: hull of the Target blocks, px.
+        u_m: as in `CameraSample`.
+        v_m: as in `CameraSample`.
+        box: bounding box of the Target blocks, px.
         alone: no other face was reported.
     """
 
@@ -121,16 +121,16 @@ class CameraFit:
         return np.array([getattr(self, name) for name in NAMES])
 
 
-def face_views(sightings: Iterable[Sighting]) -> list[FaceView]:
+def face_views(samples: Iterable[CameraSample]) -> list[FaceView]:
     """List the views of a whole Target face by a follower that is parallel to its neighbour, by u, then v."""
     views = []
-    for sighting in sightings:
-        boxes = hulls(sighting.blocks)
+    for sample in samples:
+        boxes = bounding_boxes(sample.blocks)
         box = boxes.get(TARGET)
-        if sighting.clockwise_deg != 0.0 or box is None:
+        if sample.clockwise_deg != 0.0 or box is None:
             continue
         if box.left > _MARGIN_PX and box.right < _WIDTH_PX - 1.0 - _MARGIN_PX:
-            views.append(FaceView(sighting.u_m, sighting.v_m, box, len(boxes) == 1))
+            views.append(FaceView(sample.u_m, sample.v_m, box, len(boxes) == 1))
     return sorted(views, key=lambda view: (view.u_m, view.v_m))
 
 

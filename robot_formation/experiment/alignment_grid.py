@@ -25,7 +25,6 @@ from robot_formation.experiment.alignment_trial import (
     Equipment,
     Start,
     gap_m,
-    in_frame,
     poses,
 )
 from robot_formation.files import check_file
@@ -104,8 +103,8 @@ def faces_seen(equipment: Equipment, start: Start) -> str:
     chassis = equipment.world.chassis
     if gap_m(leader, follower, chassis.length_m, chassis.width_m) <= _LEAST_GAP_M:
         return ""
-    ahead, left = in_frame(follower, leader)
-    if left <= 0.0 or abs(math.atan2(ahead, left)) > _WIDEST_RAD:
+    other = leader.planar.relative_to(follower.planar)
+    if other.y_m <= 0.0 or abs(math.atan2(other.x_m, other.y_m)) > _WIDEST_RAD:
         return ""  # far outside the picture
     world = World(equipment.surface, robots, equipment.world, seed=0)
     detector = BlockDetector(equipment.detector.load(), equipment.detector)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from robot_formation import names
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
-from robot_formation.control.approach import legs
+from robot_formation.control.alignment_state import AlignmentState, State
 from robot_formation.control.drive import Drive, DriveParameters
 from robot_formation.control.fine_tuner import (
     Action,
@@ -19,9 +19,10 @@ from robot_formation.control.fine_tuner import (
     Lost,
     RequestFrames,
     SendMove,
-    State,
 )
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.control.motion_planner import count_legs
+from robot_formation.geometry.footprint import footprint_gap_m
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion, formation_error_uv_m
 from robot_formation.surface import Surface
 from robot_formation.vision.block import Block
 from robot_formation.vision.detector import BlockDetector
@@ -35,6 +36,7 @@ from robot_formation.world.world import World
 FOLLOWER = names.follower(1)
 HEADING_RAD = math.pi / 2.0
 _PUSHED_M = 5e-4
+_OUTCOMES = [state.value for state in (AlignmentState.ALIGNED, AlignmentState.UNALIGNED, AlignmentState.LOST)]
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,6 @@ class Trial:
 
     Attributes:
         errors: u, v [m] in the neighbour's frame and heading [rad], by ground truth.
-        offset: the way to the formation position as the follower estimates it at the end.
     """
 
     start: Start
@@ -81,7 +82,6 @@ class Trial:
     moves: int = 0
     commands: int = 0
     path_m: float = 0.0
-    turned_rad: float = 0.0
     touched: bool = False
     errors: tuple[float, float, float] = (math.nan, math.nan, math.nan)
     states: list[str] = field(default_factory=list)
@@ -146,13 +146,13 @@ class AlignmentTrial:
         """Carry out an action; True at the end."""
         match action:
             case SendMove(motion):
-                self.trial.moves += legs(motion)
+                self.trial.moves += count_legs(motion)
                 self.trial.commands += 1
                 self._move(motion)
             case RequestFrames(count):
                 self._look(count)
-            case State(text):
-                self.trial.states.append(text)
+            case State():
+                self.trial.states.append(action.text)
             case Lost() | Done():
                 return True
             case _:
@@ -178,7 +178,6 @@ class AlignmentTrial:
             action = self._drive.joint_states(final.stamp_ns, final.positions, final.velocities)
         assert action.moved is not None
         self.trial.path_m += math.hypot(action.moved.x_m, action.moved.y_m)
-        self.trial.turned_rad += abs(action.moved.yaw_rad)
         self._actions.extend(self._tuner.moved(action.moved, world.stamp_ns))
 
     def _look(self, count: int) -> None:
@@ -202,32 +201,14 @@ class AlignmentTrial:
             self.trial.touched = True
 
     def _judge(self) -> None:
-        words = [state for state in self.trial.states if state in ("aligned", "unaligned", "lost")]
+        words = [state for state in self.trial.states if state in _OUTCOMES]
         self.trial.outcome = words[-1] if words else "lost"
         leader = self._world.ground_truth(names.LEADER).pose
         follower = self._world.ground_truth(FOLLOWER).pose
-        forward, left = in_frame(leader, follower)
         yaw = math.remainder(follower.yaw_rad - leader.yaw_rad, math.tau)
-        self.trial.errors = (-(left + FORMATION_DISTANCE_M), forward, yaw)
-
-
-def in_frame(of: Pose, other: Pose) -> tuple[float, float]:
-    """Place of another robot's origin ahead of a robot and to its left, in world x, y, metres."""
-    c, s = math.cos(of.yaw_rad), math.sin(of.yaw_rad)
-    dx, dy = other.position[0] - of.position[0], other.position[1] - of.position[1]
-    return c * dx + s * dy, c * dy - s * dx
+        self.trial.errors = (*formation_error_uv_m(follower.planar, leader.planar, FORMATION_DISTANCE_M), yaw)
 
 
 def gap_m(a: Pose, b: Pose, length_m: float, width_m: float) -> float:
     """Distance of two bodies, seen from above, along their best separating axis; negative if they overlap."""
-    half = (0.5 * length_m, 0.5 * width_m)
-    place = (b.position[0] - a.position[0], b.position[1] - a.position[1])
-    gaps = []
-    for heading in (a.yaw_rad, a.yaw_rad + 0.5 * math.pi, b.yaw_rad, b.yaw_rad + 0.5 * math.pi):
-        axis = (math.cos(heading), math.sin(heading))
-        reach = sum(
-            half[0] * abs(math.cos(heading - pose.yaw_rad)) + half[1] * abs(math.sin(heading - pose.yaw_rad))
-            for pose in (a, b)
-        )
-        gaps.append(abs(axis[0] * place[0] + axis[1] * place[1]) - reach)
-    return max(gaps)
+    return footprint_gap_m(b.planar.relative_to(a.planar), length_m, width_m)

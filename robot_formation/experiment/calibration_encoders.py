@@ -11,15 +11,15 @@ from collections.abc import Callable
 from robot_formation.control.calibration import calibrated, limits
 from robot_formation.control.distance_comparison import Travelled
 from robot_formation.control.drive import LEG_SIGNS, Drive, DriveParameters
-from robot_formation.control.motion import Motion
-from robot_formation.experiment.calibration_course import LEGS, Course, RobotOnCourse
+from robot_formation.experiment.calibration_rig import LEGS, CalibrationRig, RobotOnRig
+from robot_formation.geometry.se2 import Motion
 
 AXES = ("v", "u")
 PRESETS = 10
 
 
 def measure_encoders(
-    course: Course,
+    rig: CalibrationRig,
     robot: str,
     drive: DriveParameters,
     repeats: int,
@@ -28,7 +28,7 @@ def measure_encoders(
     """Drive ten preset distances up to the calibrated range along v and u, forth and back, and measure each.
 
     Args:
-        course: where.
+        rig: where.
         robot: which robot; its curves in `drive.calibration_file` are used, if there is one.
         drive: parameters of its drive.
         repeats: how often each distance is driven forth and back.
@@ -40,18 +40,18 @@ def measure_encoders(
     parameters = calibrated(drive, robot)
     state_machine = Drive(parameters)
     found = []
-    with RobotOnCourse(course, robot) as on_course:
+    with RobotOnRig(rig, robot) as on_rig:
         for axis in AXES:
             presets = [limits(parameters)[axis] * (k / PRESETS) for k in range(1, PRESETS + 1)]
             for _ in range(repeats):
                 for preset in presets:
                     for way in (preset, -preset):
-                        found.append(_measure(on_course, state_machine, axis, way, parameters.wheel_radius_m))
+                        found.append(_measure(on_rig, state_machine, axis, way, parameters.wheel_radius_m))
             say(f"{robot} {axis}: {2 * repeats * PRESETS} drives")
     return found
 
 
-def _measure(robot: RobotOnCourse, drive: Drive, axis: str, way_m: float, wheel_radius_m: float) -> Travelled:
+def _measure(robot: RobotOnRig, drive: Drive, axis: str, way_m: float, wheel_radius_m: float) -> Travelled:
     target = Motion.from_uv(way_m if axis == "u" else 0.0, way_m if axis == "v" else 0.0)
     seen, sensed = robot.move(drive, target)
     signs = LEG_SIGNS[LEGS[axis]]

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from robot_formation.control.calibration import MotorCalibration, limits
 from robot_formation.control.calibration_fit import AxisFit, MeasuredDrive, fit_axis
 from robot_formation.control.drive import DriveParameters
-from robot_formation.experiment.calibration_course import Course, RobotOnCourse
+from robot_formation.experiment.calibration_rig import CalibrationRig, RobotOnRig
 from robot_formation.names import LEADER
 
 # More of the short ones, because corrections are short.
@@ -35,12 +35,12 @@ def preset_rotations(axis: str, drive: DriveParameters) -> list[float]:
 
 
 def calibrate_robot(
-    robot: RobotOnCourse, drive: DriveParameters, repeats: int, say: Callable[[str], None] = lambda text: None
+    robot: RobotOnRig, drive: DriveParameters, repeats: int, say: Callable[[str], None] = lambda text: None
 ) -> dict[str, AxisFit]:
     """Measure and fit a robot's axes. Every rotation is driven forth and back, so that the robot stays in its place.
 
     Args:
-        robot: on its course.
+        robot: on its rig.
         drive: its nominal geometry, range and speed; its curves aren't used.
         repeats: how often each rotation is driven forth and back.
         say: takes a line of progress per axis.
@@ -59,7 +59,7 @@ def calibrate_robot(
 
 
 def calibrate_motors(
-    course: Course,
+    rig: CalibrationRig,
     robots: list[str],
     drive: DriveParameters,
     repeats: int,
@@ -68,7 +68,7 @@ def calibrate_motors(
     """Measure and fit every robot, each alone on the plate; fits by robot and axis."""
     fits: Fits = {}
     for name in robots:
-        with RobotOnCourse(course, name) as robot:
+        with RobotOnRig(rig, name) as robot:
             fits[name] = calibrate_robot(robot, drive, repeats, say)
     return fits
 
@@ -78,7 +78,7 @@ def curves(fits: Fits) -> MotorCalibration:
     return MotorCalibration({robot: {axis: fit.curve for axis, fit in axes.items()} for robot, axes in fits.items()})
 
 
-def _forth_and_back(robot: RobotOnCourse, axis: str, drive: DriveParameters) -> list[MeasuredDrive]:
+def _forth_and_back(robot: RobotOnRig, axis: str, drive: DriveParameters) -> list[MeasuredDrive]:
     drives = []
     for rotation in preset_rotations(axis, drive):
         for signed in (rotation, -rotation):

@@ -15,7 +15,7 @@ from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.recorder import Recorder
 from robot_formation.components.catalogue import KINDS
 from robot_formation.control.calibration import CalibrationError
-from robot_formation.control.sightings import Sighting
+from robot_formation.control.camera_samples import CameraSample
 from robot_formation.experiment.alignment_trial import FOLLOWER
 from robot_formation.experiment.pool import run_parallel
 from robot_formation.experiment.scenario import Scenario
@@ -59,8 +59,8 @@ _RELEVANT = {
 }
 
 
-def carry_out(positions: Iterable[Position], conditions: Conditions, jobs: int) -> Iterator[list[Sighting]]:
-    """Look at all positions, on several cores by joblib; yields each position's sightings, in order.
+def carry_out(positions: Iterable[Position], conditions: Conditions, jobs: int) -> Iterator[list[CameraSample]]:
+    """Look at all positions, on several cores by joblib; yields each position's samples, in order.
 
     Raises:
         CalibrationError: if a worker process dies.
@@ -73,7 +73,7 @@ def carry_out(positions: Iterable[Position], conditions: Conditions, jobs: int) 
         ) from None
 
 
-def write_bag(path: Path, sightings: Iterable[Sighting], conditions: Conditions, metadata: Mapping[str, str]) -> Path:
+def write_bag(path: Path, samples: Iterable[CameraSample], conditions: Conditions, metadata: Mapping[str, str]) -> Path:
     """Write what was seen, one place after the other: the follower's blocks, both true poses, the camera's calibration.
 
     Each attainable place has its own time, in which the longest look fits; poses are stamped at its beginning, blocks
@@ -89,13 +89,13 @@ def write_bag(path: Path, sightings: Iterable[Sighting], conditions: Conditions,
     recorder = Recorder(path, metadata)
     try:
         _write_descriptions(recorder, conditions)
-        for number, sighting in enumerate(s for s in sightings if s.attainable):
+        for number, sample in enumerate(s for s in samples if s.attainable):
             begin_ns = number * period_ns
-            poses = stand(world, sighting.u_m, sighting.v_m, sighting.clockwise_deg)
+            poses = stand(world, sample.u_m, sample.v_m, sample.clockwise_deg)
             for robot, pose in zip((names.LEADER, FOLLOWER), poses, strict=True):
                 _record(recorder, "", names.ground_truth_odom(robot), _odometry(pose, robot, begin_ns))
-            end_ns = begin_ns + sighting.frames * _NS // rate
-            blocks = conversions.blocks(sighting.blocks, f"{FOLLOWER}/{names.OPTICAL_FRAME}", end_ns)
+            end_ns = begin_ns + sample.frames * _NS // rate
+            blocks = conversions.blocks(sample.blocks, f"{FOLLOWER}/{names.OPTICAL_FRAME}", end_ns)
             _record(recorder, FOLLOWER, names.BLOCKS, blocks)
     finally:
         recorder.close()

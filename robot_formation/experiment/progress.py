@@ -10,7 +10,8 @@ from functools import partial
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
+from robot_formation.control.alignment_state import AlignmentState
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 
 _SAME = 1e-6  # metres and radians
 
@@ -121,11 +122,14 @@ class Progress:
         self._heard[robot].timesteps.append((conversions.stamp_of(message), conversions.read_displacement(message)))
 
     def _alignment(self, robot: str, message: Any) -> None:
+        state = AlignmentState.parse(message.data)
         heard = self._heard[robot]
         heard.state = message.data
-        if message.data in ("collect", "predict"):
+        if state is None:
+            return
+        if state.opens_timestep:
             heard.begun += 1
-        elif message.data == "lost":
+        elif state is AlignmentState.LOST:
             self._say(f"{robot}: lost its beacon neighbour in timestep {heard.begun}")
 
     def _tell(self) -> None:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.control.motion import Motion
 from robot_formation.experiment.recording import Recording, equal, handlers, host
+from robot_formation.geometry.se2 import Motion
 from robot_formation.vision.block import Block
 
 

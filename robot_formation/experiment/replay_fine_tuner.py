@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.control.motion import Motion
+from robot_formation.control.alignment_state import AlignmentState
 from robot_formation.experiment.recording import Recording, equal, handlers, host
+from robot_formation.geometry.se2 import Motion
 
-_BEGINNINGS = ("align", "collect", "predict")
 _SENT = (names.ALIGNMENT, names.MOVE, names.DISPLACEMENT, names.RESIDUAL)
 
 
@@ -33,7 +33,7 @@ class Decisions:
     @property
     def corrections(self) -> tuple[Motion, ...]:
         """The moves after the prediction move; all of them in timestep 0, which has none."""
-        return self.moves if self.states[:1] == ("align",) else self.moves[1:]
+        return self.moves if self.states[:1] == (AlignmentState.ALIGN.format(),) else self.moves[1:]
 
     def first(self, moves: int) -> Decisions:
         """Keep what was decided up to a number of moves."""
@@ -191,8 +191,9 @@ class _Driver:
 
 
 def _moves(state: str) -> bool:
-    """Tell whether a move goes with a state."""
-    return state in _BEGINNINGS[1:] or state.startswith("correct")
+    """Whether a move goes with a state."""
+    parsed = AlignmentState.parse(state)
+    return parsed is not None and parsed.sends_move
 
 
 def _split(sent: dict[str, list[Any]]) -> list[Decisions]:
@@ -201,7 +202,8 @@ def _split(sent: dict[str, list[Any]]) -> list[Decisions]:
     found: list[tuple[list[str], list[Motion]]] = []
     for message in sent[names.ALIGNMENT.name]:
         state = message.data
-        if state in _BEGINNINGS or not found:
+        parsed = AlignmentState.parse(state)
+        if (parsed is not None and parsed.begins) or not found:
             found.append(([], []))
         found[-1][0].append(state)
         if moves and _moves(state):

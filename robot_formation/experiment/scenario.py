@@ -11,10 +11,10 @@ from typing import Any
 
 from robot_formation import names
 from robot_formation.components.catalogue import KINDS, NodeKind
-from robot_formation.control.motion import FORMATION_DISTANCE_M
 from robot_formation.errors import FormationError, shown
-from robot_formation.experiment.camera_facts import check_camera
-from robot_formation.experiment.drive_curves import check_curves
+from robot_formation.experiment.camera_check import check_camera
+from robot_formation.experiment.drive_check import check_curves
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.parameters import (
     ParameterError,
     check_as,

@@ -20,9 +20,9 @@ from robot_formation.analysis.conditions import conditions
 from robot_formation.analysis.quantities import analyse
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
-from robot_formation.experiment.ideal import IDEAL, IdealRun
+from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
-from robot_formation.experiment.memory import run_in_memory
+from robot_formation.experiment.oracle import IDEAL, IdealRun
 from robot_formation.experiment.pool import run_parallel
 from robot_formation.files import MOST_RECORD_BYTES, check_file, read_file
 from robot_formation.koopman.predictors import NAMES

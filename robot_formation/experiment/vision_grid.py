@@ -18,9 +18,9 @@ from robot_formation.components.block_detector import BlockDetectorNodeParameter
 from robot_formation.components.world import WorldNodeParameters
 from robot_formation.control.alignment import FRONT, REAR, TARGET
 from robot_formation.control.calibration import CalibrationError
+from robot_formation.control.camera_samples import CameraSample
 from robot_formation.control.edge_bias import Corners
 from robot_formation.control.fine_tuner import LookParameters
-from robot_formation.control.sightings import Sighting
 from robot_formation.experiment.alignment_trial import FOLLOWER, Start, gap_m, poses
 from robot_formation.vision.block import Block
 from robot_formation.vision.detector import BlockDetector
@@ -92,7 +92,7 @@ def positions(step_m: float, width_m: float) -> list[Position]:
     return list(found.values())
 
 
-def measure(position: Position, conditions: Conditions) -> list[Sighting]:
+def measure(position: Position, conditions: Conditions) -> list[CameraSample]:
     """Look once at each angle of a position.
 
     The noise depends on seed and position only, so the order of positions and the number of workers don't matter.
@@ -107,12 +107,12 @@ def stand(world: WorldNodeParameters, u_m: float, v_m: float, clockwise_deg: flo
     return _bench(world, None).stand(u_m, v_m, clockwise_deg)
 
 
-def true_faces(world: WorldNodeParameters, sighting: Sighting) -> dict[int, Corners]:
+def true_faces(world: WorldNodeParameters, sample: CameraSample) -> dict[int, Corners]:
     """Project the corners of the neighbour's marker faces, by signature, as `edge_biases` takes them.
 
     Faces that reach behind the lens are left out.
     """
-    return _bench(world, None).faces(sighting)
+    return _bench(world, None).faces(sample)
 
 
 class _Bench:
@@ -128,8 +128,8 @@ class _Bench:
         leader, follower = poses(self._surface, Start(u_m, v_m, clockwise_deg))
         return leader.pose(self._surface, self._world), follower.pose(self._surface, self._world)
 
-    def faces(self, sighting: Sighting) -> dict[int, Corners]:
-        leader, follower = self.stand(sighting.u_m, sighting.v_m, sighting.clockwise_deg)
+    def faces(self, sample: CameraSample) -> dict[int, Corners]:
+        leader, follower = self.stand(sample.u_m, sample.v_m, sample.clockwise_deg)
         rotation, lens = self._camera.optical_frame(follower)
         marker = self._world.marker
         half, heights = marker.edge_m / 2.0, (marker.top_m, marker.top_m - marker.edge_m)
@@ -140,11 +140,11 @@ class _Bench:
                 found[signature] = self._camera.project(follower, corners)
         return found
 
-    def look(self, sensor: Sensor, position: Position, angle: float, look: LookParameters) -> Sighting:
+    def look(self, sensor: Sensor, position: Position, angle: float, look: LookParameters) -> CameraSample:
         leader, follower = self.stand(position.u_m, position.v_m, angle)
         chassis = self._world.chassis
         if gap_m(leader, follower, chassis.length_m, chassis.width_m) <= 0.0:
-            return Sighting(position.u_m, position.v_m, angle, attainable=False)
+            return CameraSample(position.u_m, position.v_m, angle, attainable=False)
         development = sensor.develop(self._camera.light(follower, [leader]))
         rate = self._world.camera.min_frames_per_second
         detector = self._detector
@@ -159,7 +159,7 @@ class _Bench:
                 yield tuple(detector.process(scaled(picture), number * 10**6 // rate))
 
         reports = _until_steady(frames(), look)
-        return Sighting(position.u_m, position.v_m, angle, True, len(reports), reports[-1])
+        return CameraSample(position.u_m, position.v_m, angle, True, len(reports), reports[-1])
 
 
 @lru_cache(maxsize=4)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from robot_formation.control.calibration import CalibrationError
-from robot_formation.control.sightings import Sighting
+from robot_formation.control.camera_samples import CameraSample
 from robot_formation.experiment.vision_grid import Position
 from robot_formation.files import MOST_RECORD_BYTES, check_file, read_file
 from robot_formation.vision.block import Block
@@ -30,7 +30,7 @@ class VisionTable:
 
     Attributes:
         path: of the CSV file.
-        sightings: by position, what is in the table; whole positions only.
+        samples: by position, what is in the table; whole positions only.
     """
 
     def __init__(self, folder: Path, record: Mapping[str, Any], positions: Sequence[Position]) -> None:
@@ -41,7 +41,7 @@ class VisionTable:
         """
         self.path = folder / TABLE_NAME
         recorded = folder / RECORD_NAME
-        self.sightings: dict[Key, list[Sighting]] = {}
+        self.samples: dict[Key, list[CameraSample]] = {}
         if recorded.exists():
             _require_same(recorded, record)
         elif self.path.exists():
@@ -49,35 +49,35 @@ class VisionTable:
         recorded.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
         if self.path.exists():
             wanted = {(p.u_m, p.v_m): len(p.angles_deg) for p in positions}
-            groups: dict[Key, list[Sighting]] = {}
-            for sighting in read_table(self.path):
-                groups.setdefault((sighting.u_m, sighting.v_m), []).append(sighting)
+            groups: dict[Key, list[CameraSample]] = {}
+            for sample in read_table(self.path):
+                groups.setdefault((sample.u_m, sample.v_m), []).append(sample)
             # A position that was cut off by the end of the last run is looked at again.
-            self.sightings = {key: found for key, found in groups.items() if len(found) == wanted.get(key)}
+            self.samples = {key: found for key, found in groups.items() if len(found) == wanted.get(key)}
         unfinished = self.path.with_suffix(".partial")
         with unfinished.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(COLUMNS)
-            for found in self.sightings.values():
+            for found in self.samples.values():
                 writer.writerows(_rows(found))
         unfinished.replace(self.path)
 
-    def add(self, found: Sequence[Sighting]) -> None:
-        """Append all sightings of a position; they are in the file when this returns."""
-        self.sightings[found[0].u_m, found[0].v_m] = list(found)
+    def add(self, found: Sequence[CameraSample]) -> None:
+        """Append all samples of a position; they are in the file when this returns."""
+        self.samples[found[0].u_m, found[0].v_m] = list(found)
         with self.path.open("a", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows(_rows(found))
 
     def remaining(self, positions: Iterable[Position]) -> list[Position]:
         """List the positions that are not in the table yet."""
-        return [position for position in positions if (position.u_m, position.v_m) not in self.sightings]
+        return [position for position in positions if (position.u_m, position.v_m) not in self.samples]
 
-    def all(self, positions: Iterable[Position]) -> list[Sighting]:
-        """List all sightings in the positions' order, which doesn't depend on the workers'."""
-        return [sighting for p in positions for sighting in self.sightings[p.u_m, p.v_m]]
+    def all(self, positions: Iterable[Position]) -> list[CameraSample]:
+        """List all samples in the positions' order, which doesn't depend on the workers'."""
+        return [sample for p in positions for sample in self.samples[p.u_m, p.v_m]]
 
 
-def read_table(path: Path) -> Iterator[Sighting]:
+def read_table(path: Path) -> Iterator[CameraSample]:
     """Read a table; a half-written last line is left out.
 
     Raises:
@@ -103,16 +103,16 @@ def read_table(path: Path) -> Iterator[Sighting]:
                 f"{path}: line {reader.line_num} can't be read; start anew with --force, or delete it"
             ) from None
         if pose is not None and found != pose:
-            yield Sighting(*pose, tuple(blocks))
+            yield CameraSample(*pose, tuple(blocks))
             blocks = []
         pose = found
         blocks += [block] if block is not None else []
     if pose is not None:
-        yield Sighting(*pose, tuple(blocks))
+        yield CameraSample(*pose, tuple(blocks))
 
 
-def _rows(sightings: Iterable[Sighting]) -> Iterator[list[Any]]:
-    for s in sightings:
+def _rows(samples: Iterable[CameraSample]) -> Iterator[list[Any]]:
+    for s in samples:
         pose = [s.u_m, s.v_m, s.clockwise_deg, int(s.attainable), s.frames]
         for block in s.blocks:
             yield [*pose, *astuple(block)]

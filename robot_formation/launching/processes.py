@@ -10,8 +10,8 @@ from typing import Any
 
 from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.camera_facts import camera_values
-from robot_formation.experiment.drive_curves import robot_curves
+from robot_formation.experiment.camera_check import camera_values
+from robot_formation.experiment.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario
 
 RECORDER = "recorder"

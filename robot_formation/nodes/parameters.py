@@ -12,7 +12,16 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from robot_formation.errors import FormationError
-from robot_formation.parameters import ParameterError, Spec, from_mapping, parameter, specs, suggestion, to_mapping
+from robot_formation.parameters import (
+    FORMER_NAMES,
+    ParameterError,
+    Spec,
+    from_mapping,
+    parameter,
+    specs,
+    suggestion,
+    to_mapping,
+)
 
 T = TypeVar("T")
 
@@ -124,7 +133,11 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
     known: dict[str, Spec] = {}
     for cls in classes:
         known.update(specs(cls))
-    given = {name: value for name, value in node._parameter_overrides.items() if not name.startswith(_OF_RCLPY)}
+    given = {
+        FORMER_NAMES.get(name, name): value
+        for name, value in node._parameter_overrides.items()
+        if not name.startswith(_OF_RCLPY)
+    }
     for name in given:
         if name not in known:
             now = _RENAMED.get(name, "")

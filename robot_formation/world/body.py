@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from robot_formation.geometry.orientation import Vector, rotate
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
 from robot_formation.world.events import BodyState
 from robot_formation.world.imperfections import Imperfections
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import Pose, Vector, rotate
+from robot_formation.world.pose import Pose
 from robot_formation.world.wheel import DRIVING, HELD, Wheel
 
 HALF_ROOT = math.sqrt(0.5)
@@ -196,9 +197,13 @@ class Body:
                 wheel.turn(0.0, dt)
                 continue
             # Forward and left in the tangent plane, and the contact's velocity along them.
-            lean = f_x * n_x + f_y * n_y + f_z * n_z
-            scale = 1.0 / sqrt(1.0 - lean * lean)
-            a_x, a_y, a_z = (f_x - lean * n_x) * scale, (f_y - lean * n_y) * scale, (f_z - lean * n_z) * scale
+            off = f_x * n_x + f_y * n_y + f_z * n_z
+            scale = 1.0 / sqrt(1.0 - off * off)
+            a_x, a_y, a_z = (
+                (f_x - off * n_x) * scale,
+                (f_y - off * n_y) * scale,
+                (f_z - off * n_z) * scale,
+            )
             b_x, b_y, b_z = n_y * a_z - n_z * a_y, n_z * a_x - n_x * a_z, n_x * a_y - n_y * a_x
             ahead = s_x * a_x + s_y * a_y + s_z * a_z
             aside = (s_x * b_x + s_y * b_y + s_z * b_z) * side

@@ -8,7 +8,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.world.pose import Pose, Vector
+from robot_formation.geometry.orientation import Vector
+from robot_formation.world.pose import Pose
 
 JOINT_NAMES = (
     "front_left_wheel",

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.geometry.orientation import Quaternion, Vector, pitch_rad, quaternion, roll_rad, rotate, yaw_rad
+from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import Surface
-
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -24,20 +23,22 @@ class Pose:
     @property
     def yaw_rad(self) -> float:
         """Heading: direction of the x axis seen from above, counter-clockwise from world x."""
-        x, y, z, w = self.orientation
-        return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+        return yaw_rad(self.orientation)
 
     @property
     def pitch_rad(self) -> float:
         """Rotation about y after yaw, positive nose down (REP-103)."""
-        x, y, z, w = self.orientation
-        return math.asin(max(-1.0, min(1.0, 2.0 * (w * y - x * z))))
+        return pitch_rad(self.orientation)
 
     @property
     def roll_rad(self) -> float:
         """Rotation about x after yaw and pitch, positive right side down (REP-103)."""
-        x, y, z, w = self.orientation
-        return math.atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+        return roll_rad(self.orientation)
+
+    @property
+    def planar(self) -> Motion:
+        """The pose seen from above: world x, y and heading."""
+        return Motion(self.position[0], self.position[1], self.yaw_rad)
 
     def place(self, point: Vector) -> Vector:
         """World coordinates of a point of the frame, metres."""
@@ -54,28 +55,6 @@ class Pose:
                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
             ]
         )
-
-
-def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Unit quaternion (x, y, z, w) of fixed-axis roll, pitch, yaw in radians."""
-    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
-    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
-    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
-
-
-def rotate(orientation: Quaternion, vector: Vector) -> Vector:
-    """Rotate a vector by a unit quaternion."""
-    x, y, z, w = orientation
-    a, b, c = vector
-    # v + w t + q x t with t = 2 q x v
-    t_x, t_y, t_z = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return (a + w * t_x + y * t_z - z * t_y, b + w * t_y + z * t_x - x * t_z, c + w * t_z + x * t_y - y * t_x)
 
 
 def off_plate(surface: Surface, robot: Pose, dot_height_m: float) -> tuple[float, float] | None:

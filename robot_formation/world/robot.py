@@ -7,17 +7,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from robot_formation.geometry.orientation import quaternion
 from robot_formation.surface import Surface
 from robot_formation.world.body import Body
 from robot_formation.world.events import JOINT_NAMES, JointStates
 from robot_formation.world.imperfections import draw_imperfections, generator
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import Pose, pose_on_surface, quaternion
+from robot_formation.world.pose import Pose, pose_on_surface
 from robot_formation.world.wheel import HELD
 
 SETTLING_ROUNDS = 4
 
-_CHANGING = ("moving", "disturbed", "awake", "timed_out", "stranded", "_steps_moving", "_steps_resting")
+_CHANGING = ("moving", "disturbed", "awake", "timed_out", "held", "_steps_moving", "_steps_resting")
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class Robot:
         moving: a motion isn't over; awake: the body takes part in the physics.
         disturbed: the motion is not a command's but comes from another body's touch.
         timed_out: the last motion was braked because it took too long.
-        stranded: its reference dot has left the plate; it is held where it is and takes no commands.
+        held: its reference dot has left the plate; it is held where it is and takes no commands.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class Robot:
         self.disturbed = False
         self.awake = True
         self.timed_out = False
-        self.stranded = False
+        self.held = False
         self._steps_moving = 0
         self._steps_resting = 0
         self._rest_steps = max(1, round(parameters.rest_time_s * parameters.physics_hz))
@@ -71,7 +72,7 @@ class Robot:
         self.body.place(self._first_pose)
 
     def settle(self, step: Callable[[], None]) -> None:
-        """Let the robot sink in and lean on its bristles, then put it back to the asked place, at rest.
+        """Let the robot settle on its wheels and their contact springs, then put it back to the asked place, at rest.
 
         Args:
             step: makes one physics step.
@@ -133,13 +134,13 @@ class Robot:
         for wheel in self.body.wheels:
             wheel.brake()
 
-    def strand(self) -> None:
-        """Hold the robot where it is, as somebody would who catches it at the edge."""
+    def hold(self) -> None:
+        """Fix the pose: the robot has left the plate."""
         for wheel in self.body.wheels:
             wheel.hold()
         self.body.freeze()
         self.moving = self.awake = False
-        self.stranded = True
+        self.held = True
 
     def save(self) -> dict[str, Any]:
         """Take everything that changes, but for Bullet's part of the body."""
@@ -206,7 +207,7 @@ class Robot:
         linear, angular = self.body.speed_squares()
         if linear == angular == 0.0:
             return False
-        if self.stranded or self._slow(linear, angular):
+        if self.held or self._slow(linear, angular):
             self.body.freeze()
             return False
         return True

@@ -118,7 +118,7 @@ class World:
         """
         target = self._robot(robot)
         angles, speeds = check_command(robot, wheel_angles_rad, speed_limits_rad_s, self.parameters.motor)
-        if target.stranded:
+        if target.held:
             raise WorldError(f"robot '{robot}' has left the plate and stays where it is; reset the world")
         lockstep = self.parameters.lockstep
         if robot not in lockstep or (target.moving and not target.disturbed):
@@ -239,7 +239,7 @@ class World:
                 continue
             left = off_plate(self.surface, robot.body.pose(), self.parameters.marker.top_m)
             if left is not None:
-                robot.strand()
+                robot.hold()
                 final = True
             joints = robot.joint_states(stamp, final=final)
             if final or any(joints.velocities):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.koopman.predictors.models import Insight, Matrix, Model, TrendFilter, Vector, array, covariance
+from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Model, TrendFilter, Vector, array, covariance
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 
 # A move that ends farther from its command has met an obstacle or was never carried out.
@@ -139,13 +139,13 @@ class Closing:
         """By how much the robot is expected to go farther than it is told, (2,)."""
         return self._bias.forecast()
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """Show the inner model, and the filtered residual and the bias beside it."""
-        inner = self._model.insight()
+        inner = self._model.diagnostics()
         notes = dict(inner.notes or {})
         for name, value in (("residual [m]", self._filter.residual), ("actuation bias [m]", self.bias())):
             notes[name] = np.array2string(value, precision=6, separator=", ")
-        return Insight(inner.k, inner.condition_number, inner.innovation, notes)
+        return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
 
     def state(self) -> dict[str, Any]:
         """Take all that it has learned."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from robot_formation.koopman.online_dmd import OnlineDMD
 from robot_formation.koopman.predictors.dictionary_text import dictionary_from_text
-from robot_formation.koopman.predictors.models import Insight, Matrix, Vector, array, optional, vector
+from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Vector, array, optional, vector
 from robot_formation.koopman.predictors.parameters import EdmdParameters, PredictorParameters
 from robot_formation.koopman.windowed_dmd import WindowedDMD
 
@@ -43,12 +43,12 @@ class Literal:
         """See `Model`."""
         return self._state if self._k is None else self._k @ self._state
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """See `Model`."""
         condition = None
         if self._k is not None:
             condition = float(np.linalg.cond(np.column_stack(self._collected[:-1])))
-        return Insight(k=self._k, condition_number=condition)
+        return Diagnostics(k=self._k, condition_number=condition)
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""
@@ -90,11 +90,11 @@ class Measured:
         assert self._last is not None  # by the protocol
         return self._last if self._pairs < 2 else self._dmd.k.dot(self._last)
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """See `Model`."""
         if self._pairs < 2:
-            return Insight()
-        return Insight(self._dmd.k, self._dmd.condition_number, self._innovation)
+            return Diagnostics()
+        return Diagnostics(self._dmd.k, self._dmd.condition_number, self._innovation)
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""
@@ -150,11 +150,11 @@ class Edmd:
             return self._history[-1]
         return np.asarray(self._p.scale_m * (self._dmd.k[self._rows] @ self._lifted))
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """See `Model`; the innovation is that of the state, in metres."""
         innovation = None if self._innovation is None else self._p.scale_m * self._innovation[self._rows]
         notes = {"observables": ", ".join(self._dictionary.names)}
-        return Insight(self._dmd.k, self._dmd.condition_number, innovation, notes)
+        return Diagnostics(self._dmd.k, self._dmd.condition_number, innovation, notes)
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from robot_formation.koopman.predictors.dmd import Edmd
-from robot_formation.koopman.predictors.models import Insight, Matrix, Model, Previous, Vector, array
+from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Model, Previous, Vector, array
 from robot_formation.koopman.predictors.parameters import PredictorParameters
 
 
@@ -26,7 +26,7 @@ class Mixture:
         self._models: dict[str, Model] = {"persistence": Previous(parameters), "koopman": self._koopman}
         self._scale = np.array([p.scale_u_m, p.scale_v_m])
         # Half squared errors in units of the scale: persistence is believed first.
-        self._losses: Matrix = np.array([[0.0, 0.0], [p.handicap, p.handicap]])
+        self._losses: Matrix = np.array([[0.0, 0.0], [p.initial_loss, p.initial_loss]])
         self._begun = False
 
     def judge(self, w: Vector) -> None:
@@ -44,12 +44,12 @@ class Mixture:
         """See `Model`."""
         return np.asarray((self._weights() * self._forecasts()).sum(axis=0))
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """See `Model`: that of the Koopman model, and how much it counts."""
-        inner = self._koopman.insight()
+        inner = self._koopman.diagnostics()
         notes = dict(inner.notes or {})
         notes["weight of koopman"] = np.array2string(self._weights()[1], precision=3, separator=", ")
-        return Insight(inner.k, inner.condition_number, inner.innovation, notes)
+        return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""

@@ -19,7 +19,7 @@ Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Insight:
+class Diagnostics:
     """What the model looks like inside, for diagnostics; absent parts are None."""
 
     k: Matrix | None = None
@@ -42,7 +42,7 @@ class Model(Protocol):
     def forecast(self) -> Vector:
         """Forecast the next displacement (2,); called after at least one observation."""
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """Show K and its quality where the model has them."""
 
     def state(self) -> dict[str, Any]:
@@ -66,9 +66,9 @@ class Previous:
         """See `Model`."""
         return self._last
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """See `Model`."""
-        return Insight()
+        return Diagnostics()
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""
@@ -95,9 +95,9 @@ class Ewma:
         assert self._mean is not None  # by the protocol
         return self._mean
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """See `Model`."""
-        return Insight()
+        return Diagnostics()
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""
@@ -173,9 +173,9 @@ class KalmanTrend:
         """See `Model`."""
         return self._filter.forecast()
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """See `Model`."""
-        return Insight()
+        return Diagnostics()
 
     def state(self) -> dict[str, Any]:
         """See `Model`."""

@@ -137,7 +137,7 @@ class FormationParameters:
     """The project's own predictor: models combined by how well each has forecast lately, residual and bias closed."""
 
     discount: float = parameter(0.9, "Weight of a past error relative to the next newer one", low=0.01, high=1.0)
-    handicap: float = parameter(
+    initial_loss: float = parameter(
         1.0,
         "How much the Koopman model is behind persistence at first (logarithm of the weights' ratio)",
         low=0.0,

@@ -17,8 +17,8 @@ from robot_formation.koopman.predictors.closing import Closing
 from robot_formation.koopman.predictors.dmd import Edmd, Literal, Measured
 from robot_formation.koopman.predictors.formation import Mixture
 from robot_formation.koopman.predictors.models import (
+    Diagnostics,
     Ewma,
-    Insight,
     KalmanTrend,
     Matrix,
     Model,
@@ -197,9 +197,9 @@ class Predictor:
             raise PredictionError(f"the stored state of the predictor can't be used: {error}") from None
         return predictor
 
-    def insight(self) -> Insight:
+    def diagnostics(self) -> Diagnostics:
         """Show K, condition number and innovation where the model has them."""
-        return self._model.insight() if self._closing is None else self._closing.insight()
+        return self._model.diagnostics() if self._closing is None else self._closing.diagnostics()
 
     def _checked(self, what: str, value: Vector) -> tuple[Vector, float, float]:
         """Return a copy of a vector (2,), and its components; refuse what no robot can do."""

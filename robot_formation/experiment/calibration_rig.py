@@ -1,4 +1,4 @@
-"""A calibration course: one robot alone in the middle of the plate, and an observer who measures its drives.
+"""A calibration rig: one robot alone in the middle of the plate, and an observer who measures its drives.
 
 The observer uses the paper's one-point reference: the white dot on the robot's top, seen from above.
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.drive import JOINTS, LEG_SIGNS, Drive
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import Surface
 from robot_formation.world.events import JointStates
 from robot_formation.world.imperfections import generator
@@ -28,7 +28,7 @@ _WHEELS = 4
 
 
 @dataclass(frozen=True)
-class Course:
+class CalibrationRig:
     """What every robot is measured on: ground, robots' parameters and seed, and the observer's error.
 
     Args:
@@ -53,20 +53,20 @@ class Observation:
     wheels_rad: tuple[float, ...]
 
 
-class RobotOnCourse:
-    """A robot of the course, in a world of its own; a context manager."""
+class RobotOnRig:
+    """A robot of the rig, in a world of its own; a context manager."""
 
-    def __init__(self, course: Course, robot: str) -> None:
-        middle = 0.5 * course.surface.size_m
+    def __init__(self, rig: CalibrationRig, robot: str) -> None:
+        middle = 0.5 * rig.surface.size_m
         start = RobotStart(robot, middle, middle, 0.0, camera=False)
         self.robot = robot
-        self._course = course
-        self._world = World(course.surface, [start], replace(course.parameters, lockstep=()), seed=course.seed)
-        self._noise = generator(course.seed, robot, "calibration reference")
+        self._rig = rig
+        self._world = World(rig.surface, [start], replace(rig.parameters, lockstep=()), seed=rig.seed)
+        self._noise = generator(rig.seed, robot, "calibration reference")
         self._joints: Sequence[float] = (0.0,) * len(JOINTS)
         self._dot, self._heading = self._look()
 
-    def __enter__(self) -> RobotOnCourse:
+    def __enter__(self) -> RobotOnRig:
         return self
 
     def __exit__(
@@ -126,8 +126,8 @@ class RobotOnCourse:
     def _look(self) -> tuple[tuple[float, float], float]:
         """Read where the dot is, with the observer's error, and the heading."""
         pose = self._world.ground_truth(self.robot).pose
-        dot = np.asarray(pose.position) + pose.matrix() @ (0.0, 0.0, self._course.parameters.marker.top_m)
-        if not all(0.0 <= value <= self._course.surface.size_m for value in dot[:2]):
+        dot = np.asarray(pose.position) + pose.matrix() @ (0.0, 0.0, self._rig.parameters.marker.top_m)
+        if not all(0.0 <= value <= self._rig.surface.size_m for value in dot[:2]):
             raise CalibrationError(f"{self.robot} has left the plate; calibrate on level ground, or on a larger plate")
-        x, y = dot[:2] + self._course.reference_noise_m * self._noise.standard_normal(2)
+        x, y = dot[:2] + self._rig.reference_noise_m * self._noise.standard_normal(2)
         return (float(x), float(y)), pose.yaw_rad

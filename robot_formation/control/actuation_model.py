@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion, into_frame
 
 _LEAST_DRIVE_M = 0.02
 _LEAST_LEG_M = 0.0022
@@ -22,7 +22,7 @@ _MOST_SHORT_M = 0.006
 _SHORT_GAIN = 0.5
 
 
-class DriveExperience:
+class ActuationModel:
     """Running means over the latest moves.
 
     Attributes:
@@ -46,16 +46,16 @@ class DriveExperience:
     def compensated(self, motion: Motion) -> Motion:
         """Ask for as much more as corrections of this axis and direction have lately fallen short by."""
         self._wanted = motion
-        x, y = _after_turn(motion, motion.yaw_rad)
-        x, y = self._longer("v", x), self._longer("u", y)
-        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-        return Motion(c * x - s * y, s * x + c * y, motion.yaw_rad)
+        turn, forward, left = motion.legs
+        return Motion.from_legs(turn, self._longer("v", forward), self._longer("u", left))
 
     def moved(self, asked: Motion, motion: Motion) -> None:
         """Take a move as it was asked for and as it was measured."""
-        sent, got = _after_turn(asked, asked.yaw_rad), _after_turn(motion, asked.yaw_rad)
+        turn = asked.yaw_rad
+        sent, got = into_frame(asked.x_m, asked.y_m, turn), into_frame(motion.x_m, motion.y_m, turn)
         if self._wanted is not None:
-            for axis, want, a, b in zip("vu", _after_turn(self._wanted, asked.yaw_rad), sent, got, strict=True):
+            wanted = into_frame(self._wanted.x_m, self._wanted.y_m, turn)
+            for axis, want, a, b in zip("vu", wanted, sent, got, strict=True):
                 self._learn(axis, want, (a - b) * math.copysign(1.0, want))
             self._wanted = None
         if sent[0] > _LEAST_DRIVE_M and got[0] > _LEAST_DRIVE_M and abs(sent[1]) < _LONGEST_BESIDE_M:
@@ -89,9 +89,3 @@ class DriveExperience:
             known = self._short.get((axis, want > 0.0), 0.0)
             mean = known + _SHORT_GAIN * (missing - known)
             self._short[axis, want > 0.0] = max(0.0, min(_MOST_SHORT_M, mean))
-
-
-def _after_turn(motion: Motion, turn_rad: float) -> tuple[float, float]:
-    """Components ahead and to the left in the frame that the turn leads to: the drive's legs."""
-    c, s = math.cos(turn_rad), math.sin(turn_rad)
-    return c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m

@@ -19,9 +19,10 @@ from robot_formation.components.fine_tuner import FineTunerNodeParameters
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters
 from robot_formation.control.alignment import AlignmentParameters
-from robot_formation.control.motion import Motion
+from robot_formation.control.alignment_state import AlignmentState
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
@@ -55,7 +56,7 @@ class IdealRun(InProcessRun):
     def _send(self, namespace: str, topic: names.Topic, message: Any) -> None:
         if (robot := self._odometry.get(names.absolute(namespace, topic.name))) is not None:
             self._poses[robot] = _pose(message.pose.pose)
-        elif topic == names.ALIGNMENT and message.data == "predict":
+        elif topic == names.ALIGNMENT and AlignmentState.parse(message.data) is AlignmentState.PREDICT:
             self._predicting.add(namespace)
         elif topic == names.MOVE and namespace in self._predicting:
             self._predicting.discard(namespace)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 
 lengths = st.floats(-10.0, 10.0)
 angles = st.floats(-2 * math.pi, 2 * math.pi)
@@ -62,3 +62,27 @@ def test_x_and_y_come_back_from_u_and_v(motion):
 def test_one_component_that_is_not_finite_makes_the_motion_not_finite(component, bad):
     assert Motion().finite
     assert not Motion(**{component: bad}).finite
+
+
+@given(motion=motions)
+def test_the_inverse_leads_back(motion):
+    assert matrix(motion.then(motion.inverse())) == pytest.approx(np.eye(3), abs=1e-12)
+
+
+@given(pose=motions, frame=motions)
+def test_a_pose_in_a_frame_composes_back_to_itself(pose, frame):
+    assert matrix(frame.then(pose.relative_to(frame))) == pytest.approx(matrix(pose), abs=1e-11)
+
+
+@given(motion=motions)
+def test_legs_driven_one_after_the_other_make_the_motion(motion):
+    turn_rad, forward_m, left_m = motion.legs
+    driven = Motion(yaw_rad=turn_rad).then(Motion(x_m=forward_m)).then(Motion(y_m=left_m))
+    assert matrix(driven) == pytest.approx(matrix(motion), abs=1e-11)
+    assert matrix(Motion.from_legs(*motion.legs)) == pytest.approx(matrix(motion), abs=1e-11)
+
+
+@given(neighbour=motions, u=st.floats(-0.1, 0.1), v=st.floats(-0.1, 0.1), yaw=angles)
+def test_formation_error_does_not_depend_on_where_the_formation_stands(neighbour, u, v, yaw):
+    follower = neighbour.then(Motion(v, -0.32 - u, yaw))
+    assert formation_error_uv_m(follower, neighbour, 0.32) == pytest.approx((u, v), abs=1e-9)

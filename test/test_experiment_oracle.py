@@ -9,13 +9,14 @@ from robot_formation import conversions
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters
 from robot_formation.control.alignment import AlignmentParameters
-from robot_formation.experiment.ideal import IdealRun, TargetFace
 from robot_formation.experiment.in_process import InProcessRun
+from robot_formation.experiment.oracle import IdealRun, TargetFace
 from robot_formation.experiment.scenario import load_track, override, with_surface
 from robot_formation.experiment.sweep import Task, run_task
+from robot_formation.geometry.orientation import quaternion
 from robot_formation.parameters import from_mapping
 from robot_formation.world.camera import Camera
-from robot_formation.world.pose import Pose, pose_on_surface, quaternion
+from robot_formation.world.pose import Pose, pose_on_surface
 
 TIMESTEPS = 8
 ALIGNMENT = AlignmentParameters()

@@ -15,7 +15,7 @@ from robot_formation.vision.block import Block
 
 
 @dataclass(frozen=True)
-class Sighting:
+class CameraSample:
     """One look from one place.
 
     Attributes:
@@ -48,8 +48,8 @@ class Overlay:
     """A position with all relative angles overlaid.
 
     Attributes:
-        u_m: as in `Sighting`.
-        v_m: as in `Sighting`.
+        u_m: as in `CameraSample`.
+        v_m: as in `CameraSample`.
         angles: relative angles that were tried.
         attainable: angles at which both robots fit.
         seen: angles at which the camera reports a block.
@@ -71,27 +71,27 @@ class Overlay:
         return " or ".join(kind.value for kind in Kind if kind in self.kinds) or "nothing"
 
 
-def kinds_of(sighting: Sighting) -> frozenset[Kind]:
+def kinds_of(sample: CameraSample) -> frozenset[Kind]:
     """Tell what a look shows; Front and Rear together, which flicker can make, count as both."""
-    seen = {block.signature for block in sighting.blocks}
+    seen = {block.signature for block in sample.blocks}
     found = {kind for kind, signature in ((Kind.FRONT, FRONT), (Kind.REAR, REAR)) if signature in seen}
     return frozenset(found or ({Kind.TARGET} if TARGET in seen else ()))
 
 
-def overlay(sightings: Iterable[Sighting]) -> list[Overlay]:
-    """Overlay all relative angles of each position; positions in the order of their first sighting."""
-    groups: dict[tuple[float, float], list[Sighting]] = {}
-    for sighting in sightings:
-        groups.setdefault((sighting.u_m, sighting.v_m), []).append(sighting)
+def overlay(samples: Iterable[CameraSample]) -> list[Overlay]:
+    """Overlay all relative angles of each position; positions in the order of their first sample."""
+    groups: dict[tuple[float, float], list[CameraSample]] = {}
+    for sample in samples:
+        groups.setdefault((sample.u_m, sample.v_m), []).append(sample)
     places = []
     for (u, v), group in groups.items():
-        kinds = [kinds_of(sighting) for sighting in group]
+        kinds = [kinds_of(sample) for sample in group]
         places.append(
             Overlay(
                 u,
                 v,
                 angles=len(group),
-                attainable=sum(sighting.attainable for sighting in group),
+                attainable=sum(sample.attainable for sample in group),
                 seen=sum(map(bool, kinds)),
                 kinds=frozenset().union(*kinds),
             )

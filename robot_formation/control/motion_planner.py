@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robot_formation.control.motion import FORMATION_DISTANCE_M, Motion
-from robot_formation.control.relative_pose import YAW, Vector, X, Y, after_motion, way_to_formation
+from robot_formation.control.relative_pose import Vector, X, Y, after_motion, pose_of
+from robot_formation.geometry.footprint import footprint_gap_m
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion, into_frame
 from robot_formation.parameters import parameter
 
 _LEG_COST_M = 0.02
@@ -27,7 +28,7 @@ _COMPENSATION_M = 0.008
 
 
 @dataclass(frozen=True)
-class ApproachParameters:
+class PlannerParameters:
     """Bodies, and how far one correction may lead."""
 
     body_length_m: float = parameter(0.365, "Length of a robot", unit="m", low=0.0, high=5.0)
@@ -40,14 +41,11 @@ class ApproachParameters:
     reach_m: float = parameter(0.75, "Distance up to which the marker is well seen", unit="m", low=0.1, high=10.0)
 
 
-class Approach:
+class MotionPlanner:
     """Plans one correction at a time."""
 
-    def __init__(self, parameters: ApproachParameters) -> None:
+    def __init__(self, parameters: PlannerParameters) -> None:
         self._p = parameters
-        half = np.array([parameters.body_length_m, parameters.body_width_m]) / 2.0
-        self._half = half
-        self._signs = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)])
 
     def next(self, states: Sequence[Vector], goal: Motion) -> Motion:
         """Choose the next motion towards a goal; no motion if there is none that keeps clear.
@@ -57,14 +55,14 @@ class Approach:
             goal: place and heading to get to, in the neighbour's frame.
         """
         state = states[0]
-        way = way_to(state, goal)
+        way = pose_of(state).then(goal)
         if self._direct(way) and all(self._clear(other, way) for other in states):
             return way
         best, least = Motion(), math.inf
         for motion in self._candidates(way):
-            if not legs(motion) or not all(self._clear(other, motion) for other in states):
+            if not count_legs(motion) or not all(self._clear(other, motion) for other in states):
                 continue
-            cost = self._cost(after_motion(state, motion), goal) + _LEG_COST_M * legs(motion)
+            cost = self._cost(after_motion(state, motion), goal) + _LEG_COST_M * count_legs(motion)
             if cost < least:
                 best, least = motion, cost
         return best
@@ -85,9 +83,8 @@ class Approach:
 
     def moves(self, way: Motion) -> int:
         """Count the corrections, axes apart, that a way takes at least."""
-        c, s = math.cos(way.yaw_rad), math.sin(way.yaw_rad)
-        forward, left = c * way.x_m + s * way.y_m, c * way.y_m - s * way.x_m
-        parts = (forward / self._p.max_v_m, left / self._p.max_u_m, way.yaw_rad / self._p.max_turn_rad)
+        turn, forward, left = way.legs
+        parts = (forward / self._p.max_v_m, left / self._p.max_u_m, turn / self._p.max_turn_rad)
         return sum(math.ceil(abs(part) - _ROUNDING_M) for part in parts)
 
     def apart(self, state: Vector) -> bool:
@@ -95,28 +92,24 @@ class Approach:
         return self._gap(state) >= self._p.clearance_m
 
     def _direct(self, way: Motion) -> bool:
-        c, s = math.cos(way.yaw_rad), math.sin(way.yaw_rad)
-        forward, left = c * way.x_m + s * way.y_m, c * way.y_m - s * way.x_m
+        turn, forward, left = way.legs
         p, spare = self._p, _COMPENSATION_M
-        return (
-            abs(forward) <= p.max_v_m - spare and abs(left) <= p.max_u_m - spare and abs(way.yaw_rad) <= p.max_turn_rad
-        )
+        return abs(forward) <= p.max_v_m - spare and abs(left) <= p.max_u_m - spare and abs(turn) <= p.max_turn_rad
 
     def _candidates(self, way: Motion) -> list[Motion]:
         p = replace(self._p, max_v_m=self._p.max_v_m - _ROUNDING_M, max_u_m=self._p.max_u_m - _ROUNDING_M)
         turn = _clip(way.yaw_rad, p.max_turn_rad)
         found = []
         for yaw in dict.fromkeys((turn, 0.0, 0.5 * turn, -0.35, 0.35)):
-            c, s = math.cos(yaw), math.sin(yaw)
-            forward, left = c * way.x_m + s * way.y_m, c * way.y_m - s * way.x_m
+            forward, left = into_frame(way.x_m, way.y_m, yaw)
             forwards = dict.fromkeys((_clip(forward, p.max_v_m), 0.0, 0.05, -0.05, 0.15, -0.15))
             lefts = dict.fromkeys((_clip(left, p.max_u_m), 0.0, -0.05, -p.max_u_m, 0.05))
             for x, y in itertools.product(forwards, lefts):
-                found.append(Motion(c * x - s * y, s * x + c * y, yaw))
+                found.append(Motion.from_legs(yaw, x, y))
         return found
 
     def _cost(self, state: Vector, goal: Motion) -> float:
-        way = way_to(state, goal)
+        way = pose_of(state).then(goal)
         cost = math.hypot(way.x_m, way.y_m) + _TURN_COST_M_PER_RAD * abs(way.yaw_rad)
         if not self._clear(state, way):
             cost += _DETOUR_COST_M
@@ -128,10 +121,8 @@ class Approach:
     def _clear(self, state: Vector, motion: Motion) -> bool:
         """Whether a motion keeps the bodies apart, or at least does not bring them nearer."""
         least = min(self._p.clearance_m, self._gap(state) - 1e-6)
-        yaw = motion.yaw_rad
-        c, s = math.cos(yaw), math.sin(yaw)
-        x, y = c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m
-        for leg in (Motion(yaw_rad=yaw), Motion(x_m=x), Motion(y_m=y)):
+        turn, forward, left = motion.legs
+        for leg in (Motion(yaw_rad=turn), Motion(x_m=forward), Motion(y_m=left)):
             if leg == Motion():
                 continue
             for share in np.linspace(0.0, 1.0, _PATH_POINTS)[1:]:
@@ -142,29 +133,12 @@ class Approach:
         return True
 
     def _gap(self, state: Vector) -> float:
-        """Distance of the bodies along their best separating axis, m; negative if they overlap."""
-        c, s = math.cos(state[YAW]), math.sin(state[YAW])
-        place = state[:2]
-        gaps = []
-        for axis in np.array([(1.0, 0.0), (0.0, 1.0), (c, s), (-s, c)]):
-            own = abs(axis[0]) * self._half[0] + abs(axis[1]) * self._half[1]
-            other = abs(axis @ (c, s)) * self._half[0] + abs(axis @ (-s, c)) * self._half[1]
-            gaps.append(abs(float(axis @ place)) - own - other)
-        return float(max(gaps))
+        return footprint_gap_m(pose_of(state), self._p.body_length_m, self._p.body_width_m)
 
 
-def way_to(state: Vector, goal: Motion) -> Motion:
-    """Tell the follower's motion to a place in its neighbour's frame."""
-    c, s = math.cos(state[YAW]), math.sin(state[YAW])
-    x, y = state[X] + c * goal.x_m - s * goal.y_m, state[Y] + s * goal.x_m + c * goal.y_m
-    return Motion(float(x), float(y), float(state[YAW] + goal.yaw_rad))
-
-
-def legs(motion: Motion) -> int:
+def count_legs(motion: Motion) -> int:
     """Count the axes that a motion uses in the follower's frame after its turn."""
-    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-    lengths = (c * motion.x_m + s * motion.y_m, c * motion.y_m - s * motion.x_m, motion.yaw_rad)
-    return sum(abs(length) > 1e-9 for length in lengths)
+    return sum(abs(length) > 1e-9 for length in motion.legs)
 
 
 def _clip(value: float, limit: float) -> float:
@@ -173,5 +147,3 @@ def _clip(value: float, limit: float) -> float:
 
 FORMATION = Motion(0.0, -FORMATION_DISTANCE_M, 0.0)
 """The formation position in the neighbour's frame."""
-
-__all__ = ["FORMATION", "Approach", "ApproachParameters", "legs", "way_to", "way_to_formation"]

@@ -4,8 +4,8 @@ import pytest
 
 from robot_formation.analysis.from_bag import load_run, run_topics
 from robot_formation.analysis.quantities import analyse
+from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun, run_in_process
-from robot_formation.experiment.memory import run_in_memory
 from robot_formation.experiment.run_result import RunError
 from robot_formation.experiment.scenario import load_track, override
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_formation.control.calibration import CalibrationError, differences
 from robot_formation.control.vision_calibration import load_vision
-from robot_formation.experiment.drive_curves import origin
+from robot_formation.experiment.drive_check import origin
 
 if TYPE_CHECKING:
     from robot_formation.experiment.scenario import Scenario

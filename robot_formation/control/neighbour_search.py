@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from robot_formation.control.alignment import Decision, Verdict
-from robot_formation.control.motion import Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 
 
@@ -23,7 +23,7 @@ class SearchParameters:
     rounds: int = parameter(2, "Rounds of turns and steps before it counts as lost", low=0, high=100)
 
 
-class LeaderSearch:
+class NeighbourSearch:
     """One search: begins with the first look in vain and ends when the neighbour is seen again."""
 
     def __init__(self, parameters: SearchParameters) -> None:
@@ -62,7 +62,7 @@ class LeaderSearch:
         p = self._p
         for _ in range(p.hold_looks - 1):
             yield None
-        yield inverse(last)
+        yield last.inverse()
         for number in range(p.rounds):
             yield Motion(yaw_rad=p.turn_rad)
             yield Motion(yaw_rad=-2.0 * p.turn_rad)
@@ -71,9 +71,3 @@ class LeaderSearch:
                 length = math.hypot(expected.x_m, expected.y_m)
                 share = min(1.0, p.max_step_m / length) if length > 0.0 else 0.0
                 yield Motion(share * expected.x_m, share * expected.y_m, 0.0)
-
-
-def inverse(motion: Motion) -> Motion:
-    """Tell the motion that leads back."""
-    c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-    return Motion(-c * motion.x_m - s * motion.y_m, s * motion.x_m - c * motion.y_m, -motion.yaw_rad)

@@ -9,18 +9,18 @@ from world_helpers import IDEAL, parameters
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.distance_comparison import Travelled, compare_distances
 from robot_formation.control.drive import CalibrationParameters, Drive, DriveParameters
-from robot_formation.control.motion import Motion
-from robot_formation.experiment.calibration_course import Course, RobotOnCourse
 from robot_formation.experiment.calibration_encoders import measure_encoders
 from robot_formation.experiment.calibration_motors import calibrate_motors, calibrate_robot, preset_rotations
+from robot_formation.experiment.calibration_rig import CalibrationRig, RobotOnRig
+from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import make_surface
 
 DRIVE = DriveParameters()
 RADIUS = DRIVE.wheel_radius_m
 
 
-def course(surface="plane", *, seed=0, noise=0.0, size_m=1.78, **values):
-    return Course(make_surface(surface, {"size_m": size_m}), parameters(**values), seed, noise)
+def rig(surface="plane", *, seed=0, noise=0.0, size_m=1.78, **values):
+    return CalibrationRig(make_surface(surface, {"size_m": size_m}), parameters(**values), seed, noise)
 
 
 def mean_of_commands(robot, curves, commands=40):
@@ -31,7 +31,7 @@ def mean_of_commands(robot, curves, commands=40):
 
 def test_a_calibrated_robot_drives_5_cm_on_average_and_the_default_curve_does_not():
     odd = {"imperfections": {"rolling_radius": 0.1}}  # one curve for all robots is visibly wrong for these
-    with RobotOnCourse(course(seed=7, size_m=40.0, **odd), "follower_1") as robot:
+    with RobotOnRig(rig(seed=7, size_m=40.0, **odd), "follower_1") as robot:
         fits = calibrate_robot(robot, DRIVE, 3)
         own = CalibrationParameters(**{axis: fit.curve for axis, fit in fits.items()})
         assert abs(mean_of_commands(robot, own) - 50.0) < 1.0
@@ -41,7 +41,7 @@ def test_a_calibrated_robot_drives_5_cm_on_average_and_the_default_curve_does_no
 
 
 def test_the_curves_of_ideal_robots_are_those_of_the_configuration():
-    fits = calibrate_motors(course(**IDEAL), ["leader", "follower_1"], DRIVE, 1)
+    fits = calibrate_motors(rig(**IDEAL), ["leader", "follower_1"], DRIVE, 1)
     assert {robot: list(axes) for robot, axes in fits.items()} == {
         "leader": ["v", "turn"],
         "follower_1": ["v", "u", "turn"],
@@ -55,10 +55,10 @@ def test_the_curves_of_ideal_robots_are_those_of_the_configuration():
 
 
 def test_the_same_course_gives_the_same_curves_whichever_robots_are_measured_beside():
-    alone = calibrate_motors(course(seed=7), ["follower_1"], DRIVE, 1)
-    both = calibrate_motors(course(seed=7), ["leader", "follower_1"], DRIVE, 1)
+    alone = calibrate_motors(rig(seed=7), ["follower_1"], DRIVE, 1)
+    both = calibrate_motors(rig(seed=7), ["leader", "follower_1"], DRIVE, 1)
     assert alone["follower_1"] == both["follower_1"]
-    other = calibrate_motors(course(seed=8), ["follower_1"], DRIVE, 1)
+    other = calibrate_motors(rig(seed=8), ["follower_1"], DRIVE, 1)
     assert other["follower_1"]["v"].curve != alone["follower_1"]["v"].curve
 
 
@@ -73,7 +73,7 @@ def test_preset_rotations_cover_the_range_of_the_drive():
 @pytest.mark.parametrize("sense", [1, -1])
 def test_an_ideal_robot_goes_the_way_of_its_wheels(axis, amount, sense):
     lever = DRIVE.wheel_lever_m if axis == "turn" else 1.0
-    with RobotOnCourse(course(**IDEAL, motor={"drive_mode": "pid"}), "follower_1") as robot:
+    with RobotOnRig(rig(**IDEAL, motor={"drive_mode": "pid"}), "follower_1") as robot:
         seen = robot.turn_wheels(axis, sense * amount * lever / RADIUS, 4.0)
     travel = seen.turn_rad if axis == "turn" else math.copysign(seen.distance_m, sense)
     assert travel == pytest.approx(sense * amount, rel=0.02)
@@ -82,27 +82,27 @@ def test_an_ideal_robot_goes_the_way_of_its_wheels(axis, amount, sense):
 
 def test_the_observers_error_shows_in_the_scatter():
     # Each distance is the difference of two readings along the way: sqrt(2) of the error of one.
-    with RobotOnCourse(course(**IDEAL, noise=0.01), "leader") as robot:
+    with RobotOnRig(rig(**IDEAL, noise=0.01), "leader") as robot:
         seen = [robot.turn_wheels("v", sense * 3.0, 12.0).distance_m for _ in range(30) for sense in (1, -1)]
     assert np.std(seen) == pytest.approx(0.01 * math.sqrt(2), rel=0.25)
 
 
 def test_a_robot_that_leaves_the_plate_ends_the_measurement():
     with (
-        RobotOnCourse(course(size_m=0.3), "leader") as robot,
+        RobotOnRig(rig(size_m=0.3), "leader") as robot,
         pytest.raises(CalibrationError, match="left the plate"),
     ):
         robot.turn_wheels("v", 10.0, 4.0)
 
 
 def test_a_move_beyond_the_range_ends_the_measurement():
-    with RobotOnCourse(course(), "leader") as robot, pytest.raises(CalibrationError, match="beyond"):
+    with RobotOnRig(rig(), "leader") as robot, pytest.raises(CalibrationError, match="beyond"):
         robot.move(Drive(DRIVE), Motion(x_m=0.5))
 
 
 def test_a_drive_that_takes_too_long_ends_the_measurement():
     with (
-        RobotOnCourse(course(motion_timeout_s=0.2), "leader") as robot,
+        RobotOnRig(rig(motion_timeout_s=0.2), "leader") as robot,
         pytest.raises(CalibrationError, match="didn't finish"),
     ):
         robot.turn_wheels("v", 10.0, 4.0)
@@ -110,7 +110,7 @@ def test_a_drive_that_takes_too_long_ends_the_measurement():
 
 def test_the_instruments_agree_to_a_pulse_and_the_wheels_error():
     flaws = {"encoder_wheel_radius": 0.01}
-    measured = measure_encoders(course(seed=1, imperfections=flaws), "follower_1", DRIVE, 1)
+    measured = measure_encoders(rig(seed=1, imperfections=flaws), "follower_1", DRIVE, 1)
     assert {drive.axis for drive in measured} == {"v", "u"}
     pulse = 2.0 * math.pi * 0.019 / 512
     for axis in ("v", "u"):

@@ -1,0 +1,1 @@
+"""Plane and space geometry that every other part shares: SE(2) motions, orientations, footprints."""
