@@ -8,12 +8,15 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 
 from robot_formation.cli.parser import Parser
 from robot_formation.errors import FormationError
 from robot_formation.paths import project_root
 
 _MOST_WORKERS = 4  # the tests of the node graph start a dozen processes each
+_SLOWEST = 20
+_QUICK = ("-m", "not graph and not slow")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Parser]) -> None:
@@ -21,8 +24,13 @@ def add_parser(subparsers: argparse._SubParsersAction[Parser]) -> None:
     parser = subparsers.add_parser(
         "test",
         help="run the project's tests",
-        description="Runs the project's tests with pytest, spread over the cores. Arguments after -- go to pytest "
-        "instead, for instance: formation test -- -k predictor -x",
+        description="Runs the project's tests with pytest, spread over the cores, and lists the slowest. Arguments "
+        "after -- go to pytest too, for instance: formation test -- -k predictor -x",
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="leave out what starts processes or takes long: the linters, the layers and the core's tests remain",
     )
     parser.add_argument("pytest_arguments", nargs="*", metavar="PYTEST_ARGUMENT", help="after --: handed to pytest")
     parser.unknown_hint = "; arguments of pytest come after --, like: formation test -- -k predictor"
@@ -44,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
         raise FormationError("the tests are part of the source, which this install lacks: run ./formation test there")
     if importlib.util.find_spec("pytest") is None:
         raise FormationError(f"pytest is not installed: pip install -e '{root}[test]'")
-    command = [sys.executable, "-m", "pytest", *(args.pytest_arguments or _spread())]
+    arguments = [*(_QUICK if args.quick else ()), *args.pytest_arguments]
+    command = [sys.executable, "-m", "pytest", f"--durations={_SLOWEST}", *_spread(arguments), *arguments]
     with subprocess.Popen(command, cwd=root) as process:
         try:
             return process.wait()
@@ -54,11 +63,15 @@ def run(args: argparse.Namespace) -> int:
             return 130
 
 
-def _spread() -> list[str]:
-    """Arguments that spread the tests over the cores, those of one group (xdist_group) on one core."""
+def _spread(arguments: Sequence[str]) -> list[str]:
+    """Arguments that spread the tests over the cores, those of one group (xdist_group) on one core.
+
+    None where the user's own arguments say how, or there is one core.
+    """
     import importlib.util
 
+    own = any(argument.startswith("-n") or argument == "no:xdist" for argument in arguments)
     workers = min(len(os.sched_getaffinity(0)), _MOST_WORKERS)
-    if workers < 2 or importlib.util.find_spec("xdist") is None:
+    if own or workers < 2 or importlib.util.find_spec("xdist") is None:
         return []
     return ["-n", str(workers), "--dist", "loadgroup"]
