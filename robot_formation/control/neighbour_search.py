@@ -31,11 +31,6 @@ class NeighbourSearch:
         self._plan: Iterator[Motion | None] | None = None
         self.looks = 0
 
-    @property
-    def under_way(self) -> bool:
-        """Whether the neighbour is out of view."""
-        return self._plan is not None
-
     def found(self) -> None:
         """End the search: the neighbour is in view."""
         self._plan, self.looks = None, 0
