@@ -6,13 +6,18 @@ A named pipe would be waited for without end, and a device such as /dev/zero has
 from __future__ import annotations
 
 import errno
+import io
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 MOST_RECORD_BYTES = 16 << 20
 """Size of the largest file that this project itself writes beside bags and tables."""
+
+MOST_LINE_CHARACTERS = 20_000
+"""Length of the longest line of a table."""
 
 _KINDS = (
     (stat.S_ISDIR, errno.EISDIR, "Is a directory"),
@@ -65,6 +70,23 @@ def read_file(path: str | Path, most_bytes: int) -> bytes:
     if len(content) > most_bytes:
         raise OSError(errno.EFBIG, f"File is larger than {size_text(most_bytes)}", str(path))
     return content
+
+
+def whole_lines(path: str | Path) -> Iterator[str]:
+    """Read a table's lines with their ends, without a last one that was cut off: half a number is a number too.
+
+    Raises:
+        OSError: as for `open_file`.
+        ValueError: if it is no UTF-8 text, or has a line that is too long.
+    """
+    with io.TextIOWrapper(open_file(path), encoding="utf-8", newline="") as file:
+        number = 0
+        while line := file.readline(MOST_LINE_CHARACTERS + 1):
+            number += 1
+            if len(line) > MOST_LINE_CHARACTERS:
+                raise ValueError(f"line {number} has more than {MOST_LINE_CHARACTERS} characters")
+            if line.endswith("\n"):
+                yield line
 
 
 def size_text(size_bytes: int) -> str:

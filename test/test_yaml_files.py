@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robot_formation.errors import MOST_CHARACTERS, FormationError, shown
 from robot_formation.experiment.scenario import load, load_track, override
-from robot_formation.files import open_file, read_file
+from robot_formation.files import open_file, read_file, whole_lines
 from robot_formation.yaml_files import YamlError, parse_yaml, read_yaml
 
 BOMB = "a: &b0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -158,3 +158,15 @@ def test_a_long_message_keeps_its_beginning_and_its_remedy():
     assert len(text) == MOST_CHARACTERS
     assert text.startswith("file.yaml: ")
     assert text.endswith("; correct the file")
+
+
+def test_a_line_of_a_table_without_its_end_was_cut_off(tmp_path):
+    (tmp_path / "t.csv").write_bytes(b"a,b\r\n1,2\n3")
+    assert list(whole_lines(tmp_path / "t.csv")) == ["a,b\r\n", "1,2\n"]
+
+
+def test_a_table_of_one_endless_line_is_refused_before_it_is_read(tmp_path):
+    with (tmp_path / "t.csv").open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(ValueError, match="more than 20000 characters"):
+        list(whole_lines(tmp_path / "t.csv"))

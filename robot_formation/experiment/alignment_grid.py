@@ -27,7 +27,7 @@ from robot_formation.experiment.alignment_trial import (
     gap_m,
     poses,
 )
-from robot_formation.files import check_file
+from robot_formation.files import whole_lines
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.detector import BlockDetector
 from robot_formation.world.events import Frame
@@ -187,18 +187,16 @@ def read_rows(path: Path) -> list[Row]:
         FormationError: if the file is no such table.
     """
     kinds = {field.name: {"int": int, "float": float}.get(str(field.type), str) for field in fields(Row)}
-    check_file(path)
-    with path.open(newline="", encoding="utf-8") as file:
-        reader = csv.reader(line for line in file if line.endswith("\n"))
-        if next(reader, None) != list(kinds):
-            raise FormationError(f"{path}: no table of alignments; choose another file")
-        try:
-            return [
-                Row(**{name: kind(cell) for (name, kind), cell in zip(kinds.items(), cells, strict=True)})
-                for cells in reader
-            ]
-        except ValueError:
-            raise FormationError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
+    reader = csv.reader(list(whole_lines(path)))
+    if next(reader, None) != list(kinds):
+        raise FormationError(f"{path}: no table of alignments; choose another file")
+    try:
+        return [
+            Row(**{name: kind(cell) for (name, kind), cell in zip(kinds.items(), cells, strict=True)})
+            for cells in reader
+        ]
+    except ValueError:
+        raise FormationError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
 
 
 def write_rows(path: Path, rows: Iterable[Row], *, anew: bool = False) -> None:

@@ -24,7 +24,7 @@ from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.oracle import IDEAL, IdealRun
 from robot_formation.experiment.pool import run_parallel
-from robot_formation.files import MOST_RECORD_BYTES, check_file, read_file
+from robot_formation.files import MOST_RECORD_BYTES, read_file, whole_lines
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.parameters import suggestion
 from robot_formation.surface import SURFACES
@@ -237,13 +237,9 @@ def read_rows(path: Path) -> Iterator[Row]:
     """
     columns = {field.name: str(field.type) for field in fields(Row)}
     try:
-        check_file(path)
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = file.readlines()
+        whole = list(whole_lines(path))
     except (OSError, ValueError) as error:
         raise SweepError(f"{path}: can't read it: {error}") from None
-    # A number that was cut off is a number too: only a line with its end is whole.
-    whole = [line for line in lines if line.endswith("\n")]
     if not whole or whole[0].rstrip() != ",".join(columns):
         raise SweepError(f"{path}: no table of a sweep's runs; choose another --out")
     reader = csv.reader(whole)

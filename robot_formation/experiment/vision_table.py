@@ -12,7 +12,7 @@ from typing import Any
 from robot_formation.control.calibration import CalibrationError
 from robot_formation.control.camera_samples import CameraSample
 from robot_formation.experiment.vision_grid import Position
-from robot_formation.files import MOST_RECORD_BYTES, check_file, read_file
+from robot_formation.files import MOST_RECORD_BYTES, read_file, whole_lines
 from robot_formation.vision.block import Block
 
 TABLE_NAME = "vision.csv"
@@ -84,10 +84,7 @@ def read_table(path: Path) -> Iterator[CameraSample]:
         CalibrationError: if the file is no such table.
     """
     try:
-        check_file(path)
-        with path.open(newline="", encoding="utf-8") as file:
-            # A number that was cut off is a number too: only a line with its end is whole.
-            reader = csv.reader([line for line in file if line.endswith("\n")])
+        reader = csv.reader(list(whole_lines(path)))
     except (OSError, ValueError) as error:
         raise CalibrationError(f"{path}: can't read it: {error}") from None
     if tuple(next(reader, ())) != COLUMNS:
