@@ -178,19 +178,29 @@ def test_the_readme_links_to_every_node_and_names_every_verb():
         assert re.search(rf"^\| `{name}\b", readme, re.MULTILINE)
 
 
-def test_the_readmes_scenario_can_be_loaded(tmp_path):
+def test_the_pages_scenario_can_be_loaded(tmp_path):
     from robot_formation.experiment.scenario import load
 
-    text = re.search(r"```yaml\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)[1]
+    text = re.search(r"```yaml\n(.*?)```", (ROOT / "docs" / "scenarios.md").read_text(), re.DOTALL)[1]
     (tmp_path / "scenario.yaml").write_text(text)
     load(tmp_path / "scenario.yaml").check()
 
 
-def test_the_readmes_launch_arguments_are_those_of_the_launch_file():
-    command = re.search(r"ros2 launch .*\\\n.*", (ROOT / "README.md").read_text())[0]
+def test_the_installations_launch_arguments_are_those_of_the_launch_file():
+    command = re.search(r"ros2 launch .*\\\n.*", (ROOT / "docs" / "installation.md").read_text())[0]
     used = re.findall(r"(\w+):=", command)
     assert used
     assert set(used) <= set(ARGUMENTS)
+
+
+def test_the_readmes_python_example_runs(capsys):
+    text = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)[1]
+    exec(compile(text, "README.md", "exec"), {})
+    *timesteps, last = capsys.readouterr().out.splitlines()
+    assert len(timesteps) == 4
+    outcome, correction_m = last.split()
+    assert outcome == "done"
+    assert 0.0 <= float(correction_m) < 0.1
 
 
 def anchors(page):
