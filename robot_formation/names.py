@@ -34,7 +34,7 @@ class Qos:
 
 
 EVENT = Qos()
-# What happened rarely is worth knowing later: whoever joins late and asks for it (transient local) gets all of it.
+# Transient local: late subscribers get the whole history.
 HISTORY = Qos(durability="transient_local")
 LATCHED = Qos(durability="transient_local", history="keep_last", depth=1)
 CLOCK = Qos(history="keep_last", depth=100)

@@ -2,8 +2,8 @@
 
 What is left for the camera to correct then comes from the robot's own scatter and the camera's noise. `ideal` commands
 the ideal move itself, `ideal+close` takes off the actuation bias as the project's predictor has learned it in the same
-run. The camera's systematic error is part of what ideal means, since the fine-tuner corrects until the camera is
-content.
+run. The camera's systematic error is part of what ideal means, since the fine-tuner corrects until the
+camera's tolerance is met.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""PyBullet, imported without the greeting that it prints on standard error, which would spoil the command line's."""
+"""PyBullet. It prints a build banner to standard error when it is imported, which is suppressed."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def exposure_of(product_s: float, parameters: CameraParameters) -> Exposure:
     time_s = min(max(product_s, LINE_S), 1.0 / parameters.min_frames_per_second)
     if parameters.flicker_avoidance:
         period_s = 0.5 / parameters.mains_hz
-        # A hair more: 1/60 s is exactly two periods of 1/120 s.
+        # 1e-9 against rounding: 1/60 s is exactly two periods of 1/120 s.
         time_s = period_s * max(1, math.floor(time_s / period_s + 1e-9))
     return Exposure(time_s, min(max(product_s / time_s, 1.0), MAX_GAIN))
 

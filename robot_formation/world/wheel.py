@@ -31,7 +31,7 @@ _CHANGING = (
 
 
 class Wheel:
-    """A mecanum wheel with its motor; the traction law of `Robot` reads and writes its fields.
+    """A mecanum wheel with its motor; the traction law of `Body` reads and writes its fields.
 
     Attributes:
         x, y, z: wheel centre from the centre of mass, body axes, metres.
