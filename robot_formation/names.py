@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from robot_formation.errors import FormationError
 
 LEADER = "leader"
+PROGRESS = "progress"
+"""Name of the node that tells the progress of a launched run: it listens, and nothing of the run needs it."""
 FORMATION = "/formation"
 
 WORLD_FRAME = "world"

@@ -55,3 +55,9 @@ def test_an_interrupted_run_has_not_failed():
 def test_a_run_that_goes_on_has_not_failed():
     run, _ = ended(("world", -9))
     assert (run.complete, run.failed) == (False, False)
+
+
+def test_the_end_of_the_node_that_tells_the_progress_is_no_end_of_the_run():
+    run, firsts = ended(("progress", -9), ("leader", 0), ("world", 0))
+    assert firsts == [False, True, False]
+    assert (run.complete, run.failed, str(run)) == (True, False, "outcome: done, bag my_bag")

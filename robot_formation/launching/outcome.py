@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from robot_formation import exit_codes
 from robot_formation.launching.processes import RECORDER
+from robot_formation.names import PROGRESS
 
 _WORDS = {exit_codes.DONE: "done", exit_codes.LOST: "lost", exit_codes.INTERRUPTED: "interrupted"}
 
@@ -52,6 +53,8 @@ class LaunchedRun:
             stopping: whether everything that was launched had been told to end.
         """
         self._ended += 1
+        if executable == PROGRESS:
+            return False  # nothing of the run needs it
         first = self.exit_code is None
         if first:
             self.exit_code = exit_codes.INTERRUPTED if stopping else verdict(executable, code)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robot_formation import names
 from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.camera_check import camera_values
@@ -15,7 +16,6 @@ from robot_formation.experiment.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario
 
 RECORDER = "recorder"
-PROGRESS = "progress"
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def processes(
 def progress(scenario: Scenario, namespace: str) -> Process:
     """Make the process that prints a launched run's progress; `formation run` follows the run itself."""
     parameters = {"followers": scenario.setup.followers, "timesteps": scenario.parameters("leader")["timesteps"]}
-    return Process(PROGRESS, namespace, parameters)
+    return Process(names.PROGRESS, namespace, parameters)
 
 
 def _inside(namespace: str, robot: str) -> str:

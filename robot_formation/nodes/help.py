@@ -20,7 +20,11 @@ _OTHERS = {
     "player": ("playing", (("writes", "the topics of the bag"),)),
     "progress": (
         "following",
-        (("reads", "ground_truth/<robot>/pose"), ("reads", "<follower>/moved, displacement and alignment")),
+        (
+            ("reads", "ground_truth/<robot>/pose"),
+            ("reads", "<robot>/moved"),
+            ("reads", "<follower>/displacement and alignment"),
+        ),
     ),
 }
 

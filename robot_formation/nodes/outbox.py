@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from robot_formation.names import IMAGE_TYPE, Topic, absolute
+from robot_formation.names import IMAGE_TYPE, PROGRESS, Topic, absolute
 
 _STAND_IN_S = 5.0
 
@@ -21,7 +21,8 @@ class Outbox:
 
     A reliable publisher that has matched a subscription delivers everything that it publishes from then on, so nothing
     needs to be known of the other side. Where a listener doesn't come but another node has subscribed in its place,
-    that one counts after a while; hidden nodes (names that begin with an underscore) never do.
+    that one counts after a while; hidden nodes (names that begin with an underscore) and the one that tells the
+    progress never do.
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class Outbox:
         """Tell whether nodes of other names listen in place of those expected: a user's own predictor, say."""
         found = self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name)
         found = [info for info in found if _full_name(info) != self._recorder]
-        names = {info.node_name for info in found if not info.node_name.startswith("_")}
+        names = {info.node_name for info in found if not info.node_name.startswith("_")} - {PROGRESS}
         return len(names) >= max(len(topic.listeners), 1)
 
 
