@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from robot_formation.launching import run_folder as folders
 from robot_formation.launching.run_folder import remove_orphans, run_folder
 
@@ -65,3 +67,61 @@ def test_links_and_other_folders_stay(tmp_path):
     (tmp_path / f"{folders.PREFIX}link").symlink_to(target)
     assert remove_orphans(tmp_path) == []
     assert target.exists()
+
+
+@pytest.mark.parametrize("moment", [1, 2])
+def test_a_folder_that_is_taken_for_an_orphan_before_it_is_locked_is_made_anew(tmp_path, monkeypatch, moment):
+    """Another run looks for orphans just before the owner's lock, or finds the lock taken just after it."""
+    flock, looked = folders.fcntl.flock, []
+
+    def look():
+        monkeypatch.setattr(folders.fcntl, "flock", flock)
+        looked.append(remove_orphans(tmp_path))
+
+    def delayed(file, operation):
+        if moment == 1:
+            look()
+        flock(file, operation)
+        if moment == 2:
+            look()
+
+    monkeypatch.setattr(folders.fcntl, "flock", delayed)
+    with run_folder(tmp_path) as folder:
+        assert list(tmp_path.iterdir()) == [folder]
+        assert remove_orphans(tmp_path) == []
+        assert [len(removed) for removed in looked] == [1 if moment == 1 else 0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_gone_before_it_has_its_lock_is_made_anew(tmp_path, monkeypatch):
+    make, made = folders.tempfile.mkdtemp, []
+
+    def removed_at_once(**options):
+        made.append(make(**options))
+        if len(made) == 1:
+            os.rmdir(made[0])
+        return made[-1]
+
+    monkeypatch.setattr(folders.tempfile, "mkdtemp", removed_at_once)
+    with run_folder(tmp_path) as folder:
+        assert str(folder) == made[1]
+        assert folder.is_dir()
+
+
+def test_a_folder_is_removed_under_its_lock_so_that_no_late_owner_takes_it(tmp_path, monkeypatch):
+    old = tmp_path / f"{folders.PREFIX}old"
+    old.mkdir()
+    os.utime(old, (0, 0))
+    remove, refused = folders.shutil.rmtree, []
+
+    def watched(folder, **options):
+        with (folder / "owner").open("r+") as lock:
+            try:
+                folders.fcntl.flock(lock, folders.fcntl.LOCK_EX | folders.fcntl.LOCK_NB)
+            except BlockingIOError:
+                refused.append(folder)
+        remove(folder, **options)
+
+    monkeypatch.setattr(folders.shutil, "rmtree", watched)
+    assert remove_orphans(tmp_path) == [old]
+    assert refused == [old]

@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 PREFIX = "robot_formation_run_"
 _LOCK = "owner"
@@ -28,10 +29,9 @@ def run_folder(parent: Path | None = None) -> Iterator[Path]:
     """
     parent = parent or Path(tempfile.gettempdir())
     remove_orphans(parent)
-    folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+    folder, lock = _locked_folder(parent)
     try:
-        with (folder / _LOCK).open("w") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with lock:
             yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -42,21 +42,34 @@ def remove_orphans(parent: Path) -> list[Path]:
     removed = []
     for folder in sorted(parent.glob(f"{PREFIX}*")):
         with contextlib.suppress(OSError):
-            if folder.is_symlink() or folder.stat().st_uid != os.getuid() or not _abandoned(folder):
-                continue
-            shutil.rmtree(folder)
-            removed.append(folder)
+            if not folder.is_symlink() and folder.stat().st_uid == os.getuid() and _remove_abandoned(folder):
+                removed.append(folder)
     return removed
 
 
-def _abandoned(folder: Path) -> bool:
-    try:
-        lock = (folder / _LOCK).open("r+")
-    except FileNotFoundError:
-        return time.time() - folder.stat().st_mtime > _OLD_S
-    with lock:
+def _locked_folder(parent: Path) -> tuple[Path, IO[str]]:
+    """Make a folder and lock its file, which stays locked until it is closed."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+        with contextlib.suppress(FileNotFoundError):  # the folder was removed before it had its file
+            lock = (folder / _LOCK).open("w")
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if os.fstat(lock.fileno()).st_nlink > 0:
+                return folder, lock
+            lock.close()  # between these lines it looked abandoned, and another run removed it
+
+
+def _remove_abandoned(folder: Path) -> bool:
+    """Remove a folder if nobody holds its lock, while holding it: its owner may be about to take it."""
+    path = folder / _LOCK
+    if not path.exists() and time.time() - folder.stat().st_mtime <= _OLD_S:
+        return False
+    with path.open("a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             return False
+        if os.fstat(lock.fileno()).st_nlink == 0:
+            return False  # another run has just removed it
+        shutil.rmtree(folder)
     return True
