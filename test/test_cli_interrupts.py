@@ -103,6 +103,15 @@ def test_a_closed_pipe_does_not_change_the_exit_code_of_a_run(tmp_path):
     assert "Traceback" not in errors
 
 
+@pytest.mark.parametrize("arguments", [["list"], ["list", "--json"], ["--help"], ["list", "--help"], ["--version"]])
+def test_a_full_disk_is_one_line_and_exit_code_2(arguments):
+    with open("/dev/full", "w") as full:
+        completed = subprocess.run([*PROCESS, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert completed.returncode == 2
+    assert completed.stderr.endswith(": output: No space left on device\n")
+    assert len(completed.stderr.splitlines()) == 1
+
+
 def test_a_terminal_that_is_closed_ends_a_run_by_130(tmp_path):
     bag = tmp_path / "bag"
     pid, terminal = pty.fork()

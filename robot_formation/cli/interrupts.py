@@ -115,6 +115,14 @@ def _wrapped(stream: Any, descriptor: int, gone: tuple[str, ...]) -> io.TextIOWr
     )
 
 
+def flush_or_forget_output() -> None:
+    """Write what is left of standard output, or forget it where it can't be written (a full disk)."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        forget_output()
+
+
 def forget_output() -> None:
     """Send the rest of standard output nowhere: its reader (head, less) has gone, and Python would complain at exit."""
     with contextlib.suppress(OSError):
