@@ -25,6 +25,7 @@ from robot_formation.launching.outcome import verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
 from robot_formation.launching.run_folder import run_folder
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
+from robot_formation.signal_handling import give_back, take
 
 if TYPE_CHECKING:
     from robot_formation.nodes.monitor import Monitor
@@ -34,7 +35,6 @@ _REMIND_S = 15.0  # without a line of progress
 _CLEANING_ROUNDS = 6
 _CAUGHT_UP_REPORTS, _CATCH_UP_S = 3, 10.0
 _ORDERLY = (exit_codes.DONE, exit_codes.LOST)
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
 RECORDER_PATIENCE_S = (10.0, 5.0)
@@ -240,14 +240,16 @@ class Launcher:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Count SIGINT, SIGTERM and SIGHUP; each after the first shortens the wait for nodes to end in good order."""
+        """Count SIGINT, SIGTERM and SIGHUP (unless it is ignored).
+
+        Each after the first shortens the wait for nodes to end in good order.
+        """
 
         def handler(number: int, frame: Any) -> None:
             self._interrupted += 1
 
-        before = {number: signal.signal(number, handler) for number in _SIGNALS}
+        before = take(handler)
         try:
             yield
         finally:
-            for number, previous in before.items():
-                signal.signal(number, previous)
+            give_back(before)
