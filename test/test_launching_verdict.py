@@ -10,7 +10,7 @@ from synthetic_bag import STORE, text
 from robot_formation.bag.place import recover_hint
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.writer import BagWriter
-from robot_formation.experiment.run_result import RunResult
+from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.launching.launcher import Launcher
 
 STRING = "std_msgs/msg/String"
@@ -22,6 +22,17 @@ def child(name, code=0, *, forced=False):
     death = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
     process = SimpleNamespace(executable=executable)
     return SimpleNamespace(name=name, process=process, exit_code=code, forced=forced, death=death)
+
+
+def test_nodes_that_are_stopped_go_on_before_a_refusal_ends_the_run():
+    launcher = Launcher(short_scenario(), None)
+    refused, stopped, signals = child("/drive", 2), child("/world"), []
+    refused.last_words, refused.state = lambda: "no such parameter", ""
+    stopped.state, stopped.signal = "T", signals.append
+    launcher._children = [refused, stopped]
+    with pytest.raises(RunError, match="/drive: no such parameter"):
+        launcher._ended_by(refused, None)
+    assert signals == [signal.SIGCONT]
 
 
 def judged(bag, *children, result=None):

@@ -146,15 +146,20 @@ class Launcher:
                 ended = next((child for child in self._children if child.poll() is not None), None)
                 if ended is not None:
                     monitor.drain(_POLL_S, lambda: progress.complete)
-                    verdict = self._verdict(ended)
-                    self._resume(monitor)
-                    return verdict
+                    return self._ended_by(ended, monitor)
                 if watchdog.due and (reason := self._look(watchdog, monitor)):
                     self._tell(f"{reason}; ending the run ...")
                     self._resume(monitor)
                     return exit_codes.NODE_DIED, reason
                 if time.monotonic() - self._said_at > _REMIND_S:
                     progress.remind()
+
+    def _ended_by(self, ended: Child, monitor: Monitor) -> tuple[int, str]:
+        """Judge a node's end, which ends the run, by the others' states; then let those that are stopped go on."""
+        try:
+            return self._verdict(ended)
+        finally:
+            self._resume(monitor)
 
     def _look(self, watchdog: Watchdog, monitor: Monitor) -> str:
         states = {child.name: child.state for child in self._children}
