@@ -19,7 +19,7 @@ STRING = "std_msgs/msg/String"
 def child(name, code=0, *, forced=False):
     """A node that has ended."""
     executable = name.rpartition("/")[2]
-    death = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+    death = f"was killed by {signal.Signals(-code).name}" if (code or 0) < 0 else f"ended with exit code {code}"
     process = SimpleNamespace(executable=executable)
     return SimpleNamespace(name=name, process=process, exit_code=code, forced=forced, death=death)
 
@@ -56,7 +56,7 @@ def test_a_run_whose_nodes_all_end_well_is_done(bag):
     assert (result.exit_code, result.reason, result.bag, result.warnings) == (0, "", bag, [])
 
 
-@pytest.mark.parametrize("code", [1, -signal.SIGKILL, -signal.SIGBUS])
+@pytest.mark.parametrize("code", [1, 3, None, -signal.SIGKILL, -signal.SIGBUS])
 @pytest.mark.parametrize("before", [0, 3])
 def test_a_recorder_that_failed_at_the_end_makes_it_a_failure(bag, before, code):
     result = judged(bag, child("/recorder", code), child("/world"), result=RunResult(before, bag))

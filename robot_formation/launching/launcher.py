@@ -21,7 +21,7 @@ from robot_formation.experiment.shared_memory import clean_orphans, fast_dds_fil
 from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
-from robot_formation.launching.outcome import verdict
+from robot_formation.launching.outcome import recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
 from robot_formation.launching.run_folder import run_folder
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
@@ -215,10 +215,11 @@ class Launcher:
         """Judge what came out after the run's own end: a recorder that failed, its bag, and other nodes' deaths."""
         if result.exit_code in _ORDERLY:
             for child in self._children:
-                if child.exit_code in _ORDERLY:
+                failed = recorder_failed(child.process.executable, child.exit_code)
+                if child.exit_code in _ORDERLY and not failed:
                     continue
                 how = "had to be killed, since it did not end when it was asked to" if child.forced else child.death
-                if child.process.executable == RECORDER:
+                if failed:
                     result.exit_code, result.reason = exit_codes.NODE_DIED, f"node {child.name} {how}"
                 else:
                     result.warnings.append(f"node {child.name} {how}, after the run's end")
