@@ -23,9 +23,9 @@ from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
 from robot_formation.launching.outcome import recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
-from robot_formation.launching.run_folder import run_folder
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
 from robot_formation.signal_handling import give_back, take
+from robot_formation.temporary_folder import RUN, temporary_folder
 
 if TYPE_CHECKING:
     from robot_formation.nodes.monitor import Monitor
@@ -94,7 +94,7 @@ class Launcher:
                 stack.enter_context(self.reservation or PathReservation(self.bag))
                 check_free(self.bag)
             stack.enter_context(self._signals())
-            folder = stack.enter_context(run_folder())
+            folder = stack.enter_context(temporary_folder(RUN))
             domain = stack.enter_context(DomainReservation())
             # Those of every domain: also what a run left whose launcher was killed itself.
             stack.callback(_clean_shared_memory, domain)

@@ -1,4 +1,4 @@
-"""The temporary folder of a run: parameter files and logs. What a killed launcher left is removed by the next one."""
+"""Temporary folders that a killed process leaves for the next one to remove: of runs, and of bags that are unpacked."""
 
 from __future__ import annotations
 
@@ -12,24 +12,28 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-PREFIX = "robot_formation_run_"
+RUN = "robot_formation_run_"
+"""How the name of a run's folder begins: parameter files and logs."""
+BAG = "robot_formation_bag_"
+"""The same of a folder for what a bag is unpacked or recovered into."""
 _LOCK = "owner"
 _OLD_S = 60.0  # a folder is locked at once after it was made; one that is older and has no lock lost its owner before
 
 
 @contextlib.contextmanager
-def run_folder(parent: Path | None = None) -> Iterator[Path]:
+def temporary_folder(prefix: str, parent: Path | None = None) -> Iterator[Path]:
     """Make a folder that is gone at the end; first remove those whose owners are dead.
 
     The owner keeps a file in it locked (flock): the kernel opens the lock when the owner dies, however that happens,
-    and the nodes don't inherit it.
+    and processes that it starts don't inherit it.
 
     Args:
+        prefix: `RUN` or `BAG`.
         parent: where folders are made; by default where the system keeps temporary files.
     """
     parent = parent or Path(tempfile.gettempdir())
     remove_orphans(parent)
-    folder, lock = _locked_folder(parent)
+    folder, lock = _locked_folder(prefix, parent)
     try:
         with lock:
             yield folder
@@ -40,23 +44,23 @@ def run_folder(parent: Path | None = None) -> Iterator[Path]:
 def remove_orphans(parent: Path) -> list[Path]:
     """Remove the folders whose owners are dead; return them. Those that this user may not remove are passed over."""
     removed = []
-    for folder in sorted(parent.glob(f"{PREFIX}*")):
+    for folder in sorted([*parent.glob(f"{RUN}*"), *parent.glob(f"{BAG}*")]):
         with contextlib.suppress(OSError):
             if not folder.is_symlink() and folder.stat().st_uid == os.getuid() and _remove_abandoned(folder):
                 removed.append(folder)
     return removed
 
 
-def _locked_folder(parent: Path) -> tuple[Path, IO[str]]:
+def _locked_folder(prefix: str, parent: Path) -> tuple[Path, IO[str]]:
     """Make a folder and lock its file, which stays locked until it is closed."""
     while True:
-        folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+        folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
         with contextlib.suppress(FileNotFoundError):  # the folder was removed before it had its file
             lock = (folder / _LOCK).open("w")
             fcntl.flock(lock, fcntl.LOCK_EX)
             if os.fstat(lock.fileno()).st_nlink > 0:
                 return folder, lock
-            lock.close()  # between these lines it looked abandoned, and another run removed it
+            lock.close()  # between these lines it looked abandoned, and another process removed it
 
 
 def _remove_abandoned(folder: Path) -> bool:
@@ -70,6 +74,6 @@ def _remove_abandoned(folder: Path) -> bool:
         except BlockingIOError:
             return False
         if os.fstat(lock.fileno()).st_nlink == 0:
-            return False  # another run has just removed it
+            return False  # another process has just removed it
         shutil.rmtree(folder)
     return True
