@@ -10,7 +10,8 @@ from robot_formation.paths import config_dir
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 """Where Fast DDS looks for profiles: until version 2, and from version 3 on."""
-_BEYOND = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")
+BEYOND = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")
+"""Variables that let nodes talk beyond this machine, or not find each other."""
 
 
 def stay_here(environment: MutableMapping[str, str]) -> None:
@@ -18,7 +19,7 @@ def stay_here(environment: MutableMapping[str, str]) -> None:
 
     It must be called before the process joins the graph for the first time.
     """
-    if not any(environment.get(name) for name in (RANGE, "ROS_LOCALHOST_ONLY", *_BEYOND)):
+    if not any(environment.get(name) for name in (RANGE, "ROS_LOCALHOST_ONLY", *BEYOND)):
         environment[RANGE] = "LOCALHOST"
     use_loopback(environment)
 
@@ -33,7 +34,7 @@ def use_loopback(environment: MutableMapping[str, str]) -> None:
 
     It must be called before the process joins the graph for the first time: Fast DDS reads profiles once.
     """
-    if environment.get(RANGE) != "LOCALHOST" or any(environment.get(name) for name in _BEYOND):
+    if environment.get(RANGE) != "LOCALHOST" or any(environment.get(name) for name in BEYOND):
         return
     if not environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp").startswith("rmw_fastrtps"):
         return

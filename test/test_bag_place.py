@@ -1,5 +1,6 @@
 """Where a bag is written: taken paths are refused before anything starts, and default names are never shared."""
 
+import errno
 import os
 from types import SimpleNamespace
 
@@ -8,6 +9,7 @@ from cli_tools import complaint
 from graph_tools import launch, short_scenario
 
 from robot_formation import paths
+from robot_formation.bag import place
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.place import PathReservation, check_free, reserve_new
 from robot_formation.cli import record, run
@@ -50,6 +52,29 @@ def test_a_reservation_can_be_taken_before_it_is_entered(tmp_path):
     again = PathReservation(tmp_path / "bag")
     assert again.take()
     again.release()
+
+
+def test_a_path_that_cannot_be_reserved_is_said_and_no_name_is_looked_for(tmp_path, monkeypatch):
+    closed, tries = [], []
+
+    class Refused:
+        def __init__(self, *kind):
+            pass
+
+        def bind(self, address):
+            tries.append(address)
+            assert len(tries) < 10, "it goes on for ever"
+            raise PermissionError(errno.EACCES, "Permission denied")
+
+        def close(self):
+            closed.append(True)
+
+    monkeypatch.setattr(place.socket, "socket", Refused)
+    with pytest.raises(BagError, match=r"run can't be reserved: Permission denied$"):
+        reserve_new(tmp_path, "run")
+    with pytest.raises(BagError, match="reserved: Permission denied"), PathReservation(tmp_path / "bag"):
+        pass
+    assert len(closed) == len(tries) == 2
 
 
 def test_names_are_counted_on_while_the_others_are_reserved_or_there(tmp_path):

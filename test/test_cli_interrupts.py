@@ -29,12 +29,12 @@ sys.meta_path.insert(0, Finder())
 """
 
 
-def interrupted_at(tmp_path, module, *arguments, number="SIGINT", times=1):
+def interrupted_at(tmp_path, module, *arguments, number="SIGINT", times=1, **options):
     """Run a verb that gets a signal when it begins to import a module."""
     (tmp_path / "sitecustomize.py").write_text(HOOK.format(module=module, times=times, number=number))
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     command = [*PROCESS, *arguments]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False, **options)
 
 
 @pytest.mark.parametrize(("number", "times"), [("SIGINT", 1), ("SIGINT", 2), ("SIGTERM", 1), ("SIGHUP", 1)])
@@ -45,6 +45,15 @@ def test_an_interrupt_while_importing_is_one_line(tmp_path, module, number, time
     assert completed.stdout == ""
     assert completed.stderr.splitlines()[-1].endswith("interrupted")
     assert "Traceback" not in completed.stderr
+
+
+def test_under_nohup_a_closed_terminal_ends_nothing(tmp_path):
+    def ignore():
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+    completed = interrupted_at(tmp_path, "numpy", *QUICK_RUN, number="SIGHUP", preexec_fn=ignore)
+    assert completed.returncode == 0
+    assert "interrupted" not in completed.stderr
 
 
 def test_the_script_keeps_interrupts_until_they_can_be_taken(tmp_path):
@@ -101,6 +110,15 @@ def test_a_closed_pipe_does_not_change_the_exit_code_of_a_run(tmp_path):
         errors = process.stderr.read()
     assert process.returncode == 3
     assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize("arguments", [["list"], ["list", "--json"], ["--help"], ["list", "--help"], ["--version"]])
+def test_a_full_disk_is_one_line_and_exit_code_2(arguments):
+    with open("/dev/full", "w") as full:
+        completed = subprocess.run([*PROCESS, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert completed.returncode == 2
+    assert completed.stderr.endswith(": output: No space left on device\n")
+    assert len(completed.stderr.splitlines()) == 1
 
 
 def test_a_terminal_that_is_closed_ends_a_run_by_130(tmp_path):

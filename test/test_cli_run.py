@@ -7,6 +7,7 @@ import pytest
 from cli_tools import complaint
 from graph_tools import formation, json_of
 
+from robot_formation.bag.errors import BagError
 from robot_formation.bag.reader import read_bag
 from robot_formation.cli.main import main
 
@@ -204,6 +205,22 @@ def test_json_of_a_run_that_left_nothing_to_analyse_says_what_it_was_to_be_and_w
         "pictures": [],
         "reason": "world died",
     }
+
+
+def test_a_run_that_left_nothing_to_analyse_names_its_bag(capsys, tmp_path, monkeypatch):
+    from robot_formation.cli import run
+    from robot_formation.experiment.run_result import RunResult
+
+    def refuse(args, result):
+        raise BagError("no timestep")
+
+    bag = tmp_path / "bag"
+    monkeypatch.setattr(run, "execute", lambda args, scenario, place: RunResult(130, bag, "interrupted"))
+    monkeypatch.setattr(run, "report", refuse)
+    assert main(["run", "--bag", str(bag)]) == 130
+    said = capsys.readouterr()
+    assert said.out == f"bag: {bag}\n"
+    assert said.err.splitlines() == ["formation run: interrupted", "formation run: no analysis: no timestep"]
 
 
 def test_the_table_names_the_conditions_of_the_run(tmp_path, capsys):

@@ -55,6 +55,28 @@ def test_where_that_fails_it_stays_where_the_recorder_said_and_the_command_works
     assert recover(partial, cut_off).messages == 1
 
 
+def test_a_system_error_leaves_it_there_too(cut_off, monkeypatch):
+    def refuse(source, out):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(bag_rescue, "recover", refuse)
+    partial = cut_off.with_name("bag.partial")
+    assert rescue(cut_off) == (None, f"{partial} can't be completed: Input/output error")
+    assert os.listdir(cut_off.parent) == ["bag.partial"]
+
+
+def test_a_completed_bag_is_there_although_what_it_was_made_of_cannot_be_removed(cut_off, monkeypatch):
+    def refuse(folder):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(bag_rescue.shutil, "rmtree", refuse)
+    bag, problem = rescue(cut_off)
+    assert bag == cut_off
+    assert problem.startswith(f"{cut_off}.cut_off can't be removed: Permission denied")
+    with read_bag(cut_off) as opened:
+        assert opened.message_count == 1
+
+
 def test_no_bag_at_all_is_none(tmp_path):
     assert rescue(tmp_path / "bag") == (None, "")
 

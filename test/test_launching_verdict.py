@@ -10,7 +10,7 @@ from synthetic_bag import STORE, text
 from robot_formation.bag.place import recover_hint
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.writer import BagWriter
-from robot_formation.experiment.run_result import RunResult
+from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.launching.launcher import Launcher
 
 STRING = "std_msgs/msg/String"
@@ -19,9 +19,20 @@ STRING = "std_msgs/msg/String"
 def child(name, code=0, *, forced=False):
     """A node that has ended."""
     executable = name.rpartition("/")[2]
-    death = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+    death = f"was killed by {signal.Signals(-code).name}" if (code or 0) < 0 else f"ended with exit code {code}"
     process = SimpleNamespace(executable=executable)
     return SimpleNamespace(name=name, process=process, exit_code=code, forced=forced, death=death)
+
+
+def test_nodes_that_are_stopped_go_on_before_a_refusal_ends_the_run():
+    launcher = Launcher(short_scenario(), None)
+    refused, stopped, signals = child("/drive", 2), child("/world"), []
+    refused.last_words, refused.state = lambda: "no such parameter", ""
+    stopped.state, stopped.signal = "T", signals.append
+    launcher._children = [refused, stopped]
+    with pytest.raises(RunError, match="/drive: no such parameter"):
+        launcher._ended_by(refused, None)
+    assert signals == [signal.SIGCONT]
 
 
 def judged(bag, *children, result=None):
@@ -45,7 +56,7 @@ def test_a_run_whose_nodes_all_end_well_is_done(bag):
     assert (result.exit_code, result.reason, result.bag, result.warnings) == (0, "", bag, [])
 
 
-@pytest.mark.parametrize("code", [1, -signal.SIGKILL, -signal.SIGBUS])
+@pytest.mark.parametrize("code", [1, 3, None, -signal.SIGKILL, -signal.SIGBUS])
 @pytest.mark.parametrize("before", [0, 3])
 def test_a_recorder_that_failed_at_the_end_makes_it_a_failure(bag, before, code):
     result = judged(bag, child("/recorder", code), child("/world"), result=RunResult(before, bag))

@@ -5,6 +5,7 @@ import configparser
 import importlib.util
 import os
 import re
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -196,6 +197,35 @@ def test_the_shell_scripts_are_executable_and_parse(script):
     assert os.access(ROOT / script, os.X_OK)
     shell = (ROOT / script).read_text().splitlines()[0].split("/")[-1].split()[-1]
     subprocess.run([shell, "-n", str(ROOT / script)], check=True)
+
+
+PYTHON = """\
+#!/bin/sh
+case $1 in
+    -c) echo 3.11 ;;
+    *) { pwd; printf '%s\\n' "$@"; } >>"${0%/*}/calls" ;;
+esac
+"""
+
+
+def test_relative_paths_of_the_installation_are_those_of_the_users_folder(tmp_path):
+    checkout, user = tmp_path / "checkout", tmp_path / "user"
+    binaries = user / "environment" / "bin"
+    checkout.mkdir()
+    binaries.mkdir(parents=True)
+    for name in ("formation", "setup.py", "setup.cfg"):
+        shutil.copy(ROOT / name, checkout / name)
+    (user / "constraints.txt").write_text("")
+    (binaries / "python").write_text(PYTHON)
+    (binaries / "python").chmod(0o755)
+    environment = {**os.environ, "FORMATION_VENV": "environment", "FORMATION_CONSTRAINTS": "constraints.txt"}
+    command = [checkout / "formation", "list"]
+    completed = subprocess.run(command, cwd=user, env=environment, capture_output=True, text=True, check=False)
+    assert completed.returncode == 0, completed.stderr
+    calls = (binaries / "calls").read_text().splitlines()
+    assert calls[0] == str(checkout)
+    assert calls[calls.index("-c") + 1] == str(user / "constraints.txt")
+    assert calls[-3:] == [str(user), str(binaries / "formation"), "list"]
 
 
 def test_the_checkout_is_found_and_its_config_comes_first():

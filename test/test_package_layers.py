@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parent.parent / "robot_formation"
 # From the bottom to the top, in a strict order: a part imports those before it only.
 LAYERS = [
     ("files", "errors", "exit_codes", "names", "parameters", "paths", "tags", "yaml_files", "png_files", "loopback"),
-    ("shared_memory_space", ""),
+    ("shared_memory_space", "signal_handling", "temporary_folder", ""),
     *((area,) for area in ("geometry", "koopman", "surface", "bag", "vision", "world", "control", "analysis")),
     *((area,) for area in ("conversions", "components", "experiment", "nodes", "launching", "cli")),
 ]

@@ -7,7 +7,6 @@ bags are recovered into one.
 from __future__ import annotations
 
 import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -23,6 +22,7 @@ from robot_formation.bag.records import MAGIC
 from robot_formation.bag.recover import in_order, mcap_files, recover
 from robot_formation.errors import shown
 from robot_formation.files import check_file, open_file, size_text
+from robot_formation.temporary_folder import BAG, temporary_folder
 from robot_formation.yaml_files import read_yaml
 
 METADATA_FILE = "metadata.yaml"
@@ -167,7 +167,9 @@ def _lacks_end(file: Path) -> bool:
 
 
 def _temporary(stack: ExitStack) -> Path:
-    return Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="robot_formation_")))
+    folder = stack.enter_context(temporary_folder(BAG)) / "bag"  # beside the file of its owner
+    folder.mkdir()
+    return folder
 
 
 def _unpacked(file: Path, folder: Path) -> Path:

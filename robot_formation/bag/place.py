@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import socket
@@ -40,7 +41,7 @@ class PathReservation:
     """Keeps a bag's path for one run of this machine: a context manager; gone with its process, and no file is left.
 
     Raises:
-        BagError: on entering, if another run has it.
+        BagError: on entering, if another run has it, or it can't be reserved.
     """
 
     def __init__(self, path: Path) -> None:
@@ -48,15 +49,21 @@ class PathReservation:
         self._socket: socket.socket | None = None
 
     def take(self) -> bool:
-        """Take the path; False if somebody has it. Entering it again later changes nothing."""
+        """Take the path; False if somebody has it. Entering it again later changes nothing.
+
+        Raises:
+            BagError: this system doesn't let it be reserved, whoever has it.
+        """
         if self._socket is not None:
             return True
         taken = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         name = hashlib.sha256(str(self.path).encode()).hexdigest()
         try:
             taken.bind(f"\0robot_formation_bag_{name}")
-        except OSError:
+        except OSError as error:
             taken.close()
+            if error.errno != errno.EADDRINUSE:
+                raise BagError(f"{self.path} can't be reserved: {error.strerror or error}") from error
             return False
         self._socket = taken
         return True
@@ -83,6 +90,9 @@ def reserve_new(folder: Path, stem: str) -> PathReservation:
 
     Returns:
         The reservation, taken already; enter it, or release it.
+
+    Raises:
+        BagError: this system doesn't let paths be reserved.
     """
     for number in count(1):
         reservation = PathReservation(folder / (stem if number == 1 else f"{stem}_{number}"))

@@ -1,6 +1,6 @@
 """Ends the command line's process quietly: interrupts at any moment, a closed terminal, closed standard streams.
 
-Imports only what Python has loaded already, since it has to be at work before anything else is imported.
+Imports hardly more than what Python has loaded already, since it has to be at work before anything else is imported.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import sys
 import time
 from typing import Any
 
-NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+from robot_formation import signal_handling
+
 _INTERRUPTED = 130
 _IMPATIENT_S = 2.0
 _AGAIN_S = 0.01
@@ -25,7 +26,8 @@ _GONE = ("EIO", "EPIPE", "EBADF", "ENXIO")
 class Interrupts:
     """Turns SIGINT, SIGTERM and SIGHUP into a KeyboardInterrupt, once: what ends in good order is not disturbed again.
 
-    A signal that comes `_IMPATIENT_S` later or after that ends the process at once.
+    SIGHUP stays ignored where it is (nohup). A signal that comes `_IMPATIENT_S` later or after that ends the process
+    at once.
 
     Attributes:
         came: whether a signal has come.
@@ -38,10 +40,9 @@ class Interrupts:
 
     def install(self) -> None:
         """Take the signals; those that came while they were blocked (./formation blocks them) come now."""
-        for number in NUMBERS:
-            signal.signal(number, self._take)
+        signal_handling.take(self._take)
         sys.unraisablehook = self._unraisable
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, NUMBERS)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, signal_handling.ENDING)
 
     def leave(self, code: int) -> None:
         """From now on a signal ends the process at once with this exit code: only Python's own end is left to do."""
@@ -113,6 +114,14 @@ def _wrapped(stream: Any, descriptor: int, gone: tuple[str, ...]) -> io.TextIOWr
         errors=stream.errors if stream is not None else "backslashreplace",
         line_buffering=descriptor == 2 or os.isatty(descriptor) or bool(os.environ.get("PYTHONUNBUFFERED")),
     )
+
+
+def flush_or_forget_output() -> None:
+    """Write what is left of standard output, or forget it where it can't be written (a full disk)."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        forget_output()
 
 
 def forget_output() -> None:

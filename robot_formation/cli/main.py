@@ -25,7 +25,7 @@ from robot_formation.cli import (
     teach,
     test,
 )
-from robot_formation.cli.interrupts import forget_output
+from robot_formation.cli.interrupts import flush_or_forget_output, forget_output
 from robot_formation.cli.parser import Parser
 from robot_formation.errors import FormationError
 
@@ -62,6 +62,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except FormationError as error:
+        flush_or_forget_output()
         print(f"formation {args.verb}: {error}", file=sys.stderr)
         return exit_codes.BAD_INPUT
     except KeyboardInterrupt:
@@ -71,5 +72,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         forget_output()
         return exit_codes.DONE
     except OSError as error:
+        flush_or_forget_output()
         print(f"formation {args.verb}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
         return exit_codes.BAD_INPUT

@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from robot_formation import exit_codes
+from robot_formation.cli.interrupts import forget_output
 from robot_formation.parameters import suggestion
 
 
@@ -29,6 +31,16 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print usage and message, end with exit code 2."""
         super().error(message.replace("ignored explicit argument", "takes no value, not"))
+
+    def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
+        """End the process; help that can't be written is said in one line, and the exit code is 2."""
+        try:
+            sys.stdout.flush()
+        except OSError as error:
+            forget_output()
+            if not isinstance(error, BrokenPipeError):
+                status, message = exit_codes.BAD_INPUT, f"{self.prog}: output: {error.strerror or error}\n"
+        super().exit(status, message)
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None

@@ -102,6 +102,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"formation run: no analysis: {error}", file=sys.stderr)
     if args.json:
         print(cut_off_json(args, scenario, result))
+    elif result.bag is not None:
+        print(f"bag: {result.bag}")
     return result.exit_code
 
 

@@ -32,15 +32,19 @@ def rescue(bag: Path) -> tuple[Path | None, str]:
         partial.rename(cut_off)  # the whole bag is written under the partial one's name first
         try:
             report = recover(cut_off, bag)
-        except BagError:
+        except (BagError, OSError):
             cut_off.rename(partial)  # where the recorder said it is, for a later try
             raise
-        if report.damaged_chunks == 0:  # what else is missing had not been written: nothing more to get out of it
-            shutil.rmtree(cut_off)
     except OSError as error:
         return None, f"{partial} can't be completed: {error.strerror or error}"
     except BagError as error:
         return None, str(error).replace(str(cut_off), str(partial))
+    if report.damaged_chunks == 0:  # what else is missing had not been written: nothing more to get out of it
+        try:
+            shutil.rmtree(cut_off)
+        except OSError as error:
+            why = error.strerror or error
+            return bag, f"{cut_off} can't be removed: {why}; {bag} holds all of it, so it can be deleted"
     return bag, ""
 
 

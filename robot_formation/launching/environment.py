@@ -6,10 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from robot_formation.loopback import use_loopback
-
-FOREIGN = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER")
-"""Variables that would let a run's nodes talk beyond this machine, or not find each other."""
+from robot_formation.loopback import BEYOND, use_loopback
 
 
 def node_environment(domain: int, log_folder: Path) -> dict[str, str]:
@@ -27,7 +24,7 @@ def node_environment(domain: int, log_folder: Path) -> dict[str, str]:
         PYTHONUNBUFFERED="1",
         PYTHONSAFEPATH="1",  # a file of the user's folder must not stand in for a library's
     )
-    for name in FOREIGN:
+    for name in BEYOND:
         environment.pop(name, None)
     environment.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     use_loopback(environment)

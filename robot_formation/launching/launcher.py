@@ -21,10 +21,11 @@ from robot_formation.experiment.shared_memory import clean_orphans, fast_dds_fil
 from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
-from robot_formation.launching.outcome import verdict
+from robot_formation.launching.outcome import recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
-from robot_formation.launching.run_folder import run_folder
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
+from robot_formation.signal_handling import give_back, take
+from robot_formation.temporary_folder import RUN, temporary_folder
 
 if TYPE_CHECKING:
     from robot_formation.nodes.monitor import Monitor
@@ -34,7 +35,6 @@ _REMIND_S = 15.0  # without a line of progress
 _CLEANING_ROUNDS = 6
 _CAUGHT_UP_REPORTS, _CATCH_UP_S = 3, 10.0
 _ORDERLY = (exit_codes.DONE, exit_codes.LOST)
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
 RECORDER_PATIENCE_S = (10.0, 5.0)
@@ -94,7 +94,7 @@ class Launcher:
                 stack.enter_context(self.reservation or PathReservation(self.bag))
                 check_free(self.bag)
             stack.enter_context(self._signals())
-            folder = stack.enter_context(run_folder())
+            folder = stack.enter_context(temporary_folder(RUN))
             domain = stack.enter_context(DomainReservation())
             # Those of every domain: also what a run left whose launcher was killed itself.
             stack.callback(_clean_shared_memory, domain)
@@ -146,15 +146,20 @@ class Launcher:
                 ended = next((child for child in self._children if child.poll() is not None), None)
                 if ended is not None:
                     monitor.drain(_POLL_S, lambda: progress.complete)
-                    verdict = self._verdict(ended)
-                    self._resume(monitor)
-                    return verdict
+                    return self._ended_by(ended, monitor)
                 if watchdog.due and (reason := self._look(watchdog, monitor)):
                     self._tell(f"{reason}; ending the run ...")
                     self._resume(monitor)
                     return exit_codes.NODE_DIED, reason
                 if time.monotonic() - self._said_at > _REMIND_S:
                     progress.remind()
+
+    def _ended_by(self, ended: Child, monitor: Monitor) -> tuple[int, str]:
+        """Judge a node's end, which ends the run, by the others' states; then let those that are stopped go on."""
+        try:
+            return self._verdict(ended)
+        finally:
+            self._resume(monitor)
 
     def _look(self, watchdog: Watchdog, monitor: Monitor) -> str:
         states = {child.name: child.state for child in self._children}
@@ -210,10 +215,11 @@ class Launcher:
         """Judge what came out after the run's own end: a recorder that failed, its bag, and other nodes' deaths."""
         if result.exit_code in _ORDERLY:
             for child in self._children:
-                if child.exit_code in _ORDERLY:
+                failed = recorder_failed(child.process.executable, child.exit_code)
+                if child.exit_code in _ORDERLY and not failed:
                     continue
                 how = "had to be killed, since it did not end when it was asked to" if child.forced else child.death
-                if child.process.executable == RECORDER:
+                if failed:
                     result.exit_code, result.reason = exit_codes.NODE_DIED, f"node {child.name} {how}"
                 else:
                     result.warnings.append(f"node {child.name} {how}, after the run's end")
@@ -240,14 +246,16 @@ class Launcher:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Count SIGINT, SIGTERM and SIGHUP; each after the first shortens the wait for nodes to end in good order."""
+        """Count SIGINT, SIGTERM and SIGHUP (unless it is ignored).
+
+        Each after the first shortens the wait for nodes to end in good order.
+        """
 
         def handler(number: int, frame: Any) -> None:
             self._interrupted += 1
 
-        before = {number: signal.signal(number, handler) for number in _SIGNALS}
+        before = take(handler)
         try:
             yield
         finally:
-            for number, previous in before.items():
-                signal.signal(number, previous)
+            give_back(before)

@@ -21,6 +21,14 @@ def verdict(executable: str, code: int) -> int:
     return exit_codes.BAD_INPUT if code == exit_codes.BAD_INPUT else exit_codes.NODE_DIED
 
 
+def recorder_failed(executable: str, code: int | None) -> bool:
+    """Tell whether a node is a recorder that did not end well (None: not at all).
+
+    It has work to do after the run's end: without its bag the run has not been what was asked for.
+    """
+    return executable == RECORDER and code != exit_codes.DONE
+
+
 def manner(code: int) -> str:
     """Say how a process ended."""
     return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
@@ -60,8 +68,7 @@ class LaunchedRun:
             self.exit_code = exit_codes.INTERRUPTED if stopping else verdict(executable, code)
             if self.exit_code not in (exit_codes.DONE, exit_codes.INTERRUPTED):
                 self.reason = f"{name} {manner(code)}"
-        # The recorder has work to do after the end: without its bag the run has not been what was asked for.
-        if executable == RECORDER and code != 0 and self.exit_code in _WORDS:
+        if recorder_failed(executable, code) and self.exit_code in _WORDS:
             self.exit_code, self.reason = exit_codes.NODE_DIED, f"{name} {manner(code)}"
         return first and not stopping
 

@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from robot_formation import conversions, names
-from robot_formation.loopback import PROFILES
+from robot_formation.loopback import BEYOND, PROFILES, RANGE
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.host import qos_profile
 
@@ -25,7 +25,7 @@ from robot_formation.nodes.host import qos_profile
 _NAME = "_monitor"
 _QUIET_ROUNDS, _MOST_ROUNDS = 3, 60
 # What a process must have in common with the run's nodes to find them at once, and where rclpy writes its log.
-_JOINING = (*PROFILES, "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "ROS_LOG_DIR")
+_JOINING = (*PROFILES, RANGE, *BEYOND, "ROS_LOG_DIR")
 
 
 @contextlib.contextmanager

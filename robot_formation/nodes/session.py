@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from robot_formation.errors import FormationError
 from robot_formation.experiment.shared_memory import TracingFiles
 from robot_formation.loopback import stay_here
+from robot_formation.signal_handling import give_back, take
 
 
 @contextlib.contextmanager
@@ -65,11 +66,9 @@ def node_session(name: str, *, namespace: str = "", **options: Any) -> Iterator[
 
 
 class Interrupts:
-    """Counts SIGINT, SIGTERM and SIGHUP, so that work ends in good order; the second one interrupts it. A context
-    manager; call it to ask whether one has come.
+    """Counts SIGINT, SIGTERM and SIGHUP (unless it is ignored), so that work ends in good order; the second one
+    interrupts it. A context manager; call it to ask whether one has come.
     """
-
-    _NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def __init__(self) -> None:
         self._count = 0
@@ -80,14 +79,13 @@ class Interrupts:
         return self._count > 0
 
     def __enter__(self) -> Interrupts:
-        self._before = {number: signal.signal(number, self._take) for number in self._NUMBERS}
+        self._before = take(self._take)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
+        give_back(self._before)
 
     def _take(self, number: int, frame: Any) -> None:
         self._count += 1

@@ -8,8 +8,8 @@ from typing import Any
 
 from robot_formation import exit_codes
 from robot_formation.shared_memory_space import SharedMemoryError, require_space
+from robot_formation.signal_handling import ENDING, take
 
-_NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _stop = False
 
 
@@ -23,9 +23,7 @@ def stop_on_signals() -> None:
         global _stop
         _stop = True
 
-    for number in _NUMBERS:
-        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, handler)
+    take(handler)
     try:
         require_space()
     except SharedMemoryError as error:
@@ -37,7 +35,7 @@ def ignore_signals() -> None:
     """Let no further signal kill this process, whose work is done: while Python ends it restores the default actions
     of all signals but those that are ignored.
     """
-    for number in _NUMBERS:
+    for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
 
 

@@ -38,7 +38,7 @@ class WorldState:
 
 def save_physics(client: int) -> bytes:
     """Take Bullet's state of all bodies. Reading and resetting poses and velocities instead would lose last bits."""
-    with tempfile.TemporaryDirectory(prefix="robot_formation_") as folder:
+    with tempfile.TemporaryDirectory(prefix="robot_formation_state_") as folder:
         file = Path(folder, "state.bullet")
         pybullet.saveBullet(str(file), physicsClientId=client)
         return file.read_bytes()
@@ -46,7 +46,7 @@ def save_physics(client: int) -> bytes:
 
 def restore_physics(client: int, state: bytes) -> None:
     """Put Bullet's state back into a client with the same bodies, made in the same order."""
-    with tempfile.TemporaryDirectory(prefix="robot_formation_") as folder:
+    with tempfile.TemporaryDirectory(prefix="robot_formation_state_") as folder:
         file = Path(folder, "state.bullet")
         file.write_bytes(state)
         pybullet.restoreState(fileName=str(file), physicsClientId=client)
