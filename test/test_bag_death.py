@@ -14,6 +14,8 @@ from synthetic_bag import STORE
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import is_being_written, recover
 
+pytestmark = pytest.mark.slow
+
 MAGIC_BYTES, CHUNK, MESSAGE = 8, 0x06, 0x05
 TICK = "std_msgs/msg/UInt32"
 WRITER = """

@@ -16,6 +16,8 @@ from robot_formation.control.calibration import load_calibration
 from robot_formation.control.calibration_fit import MeasuredDrive, fit_axis
 from robot_formation.control.distance_comparison import Travelled, compare_distances
 
+pytestmark = pytest.mark.slow
+
 QUICK = ("--repeats", "1")
 
 

@@ -15,6 +15,8 @@ from robot_formation.experiment.calibration_rig import CalibrationRig, RobotOnRi
 from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import make_surface
 
+pytestmark = pytest.mark.slow
+
 DRIVE = DriveParameters()
 RADIUS = DRIVE.wheel_radius_m
 

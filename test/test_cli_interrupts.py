@@ -13,6 +13,8 @@ from graph_tools import alive
 
 from robot_formation.paths import project_root
 
+pytestmark = pytest.mark.slow
+
 PROCESS = [sys.executable, "-m", "robot_formation.cli"]
 QUICK_RUN = ["run", "--track", "one", "--in-process", "--camera", "on_demand", "--set", "leader.timesteps=1", "--json"]
 LONG_RUN = [*QUICK_RUN[:-2], "leader.timesteps=500"]

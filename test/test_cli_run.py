@@ -11,6 +11,8 @@ from robot_formation.bag.errors import BagError
 from robot_formation.bag.reader import read_bag
 from robot_formation.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 FAST = ("--camera", "on_demand", "--in-process")
 
 

@@ -14,6 +14,8 @@ from robot_formation.cli.sweep import default_folder, seeds_text, with_progress
 from robot_formation.experiment import sweep
 from robot_formation.experiment.sweep import Row, Task
 
+pytestmark = pytest.mark.slow
+
 CHOICE = ("--tracks", "two", "--surfaces", "plane", "--predictors", "previous,formation", "--seeds", "1000:1003")
 SHORT = ("--set", "leader.timesteps=4")
 ANNOUNCED = """\

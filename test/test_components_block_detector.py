@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from component_helpers import wired
+from tag_helpers import needs_tags
 from vision_helpers import GREEN, GROUPS, RED, canvas
 
 from robot_formation import conversions, names
@@ -49,6 +50,7 @@ def blocks_in(sent):
     return conversions.read_blocks(message)
 
 
+@needs_tags
 def test_pictures_of_one_time_taken_by_two_sensors_have_no_rate(signatures, wire):
     parameters = KINDS["block_detector"].parameter_class()
     wire.give(IMAGE, image(SQUARE, 2))

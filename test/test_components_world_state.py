@@ -18,6 +18,8 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.surface import SURFACES
 
+pytestmark = pytest.mark.slow
+
 STRAIGHT = conversions.joint_command(WheelCommand((1.6,) * 4, (4.0,) * 4), 0)
 
 

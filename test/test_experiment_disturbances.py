@@ -19,6 +19,8 @@ from robot_formation.experiment.scenario import load_track, override
 from robot_formation.vision.detector import BlockDetector
 from robot_formation.vision.tracking import ClockError
 
+pytestmark = pytest.mark.slow
+
 LOOK = 22  # frames
 BESIDE = Start(0.36, -0.05, 0.0)
 GREY = 90

@@ -9,6 +9,8 @@ from robot_formation.experiment.in_process import InProcessRun, run_in_process
 from robot_formation.experiment.run_result import RunError
 from robot_formation.experiment.scenario import load_track, override
 
+pytestmark = pytest.mark.slow
+
 BASE = ["world.camera.mode=on_demand", "leader.timesteps=5", "predictor.name=formation"]
 CASES = {
     "one follower": ["seed=1000"],

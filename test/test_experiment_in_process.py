@@ -16,6 +16,8 @@ from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.names import absolute
 from robot_formation.paths import config_dir
 
+pytestmark = pytest.mark.slow
+
 TIMESTEPS = 5
 # Forecasts from three displacements may be as wild as their bound; bounded so, the follower can't touch the leader.
 CALM = ["predictor.max_u_m=0.03", "predictor.max_v_m=0.08"]

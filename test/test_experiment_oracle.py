@@ -18,6 +18,8 @@ from robot_formation.parameters import from_mapping
 from robot_formation.world.camera import Camera
 from robot_formation.world.pose import Pose, pose_on_surface
 
+pytestmark = pytest.mark.slow
+
 TIMESTEPS = 8
 ALIGNMENT = AlignmentParameters()
 # The pinhole's own side-length curve, focal length times edge: with it, on level ground, offsets are true distances.

@@ -15,6 +15,8 @@ from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.progress import Progress
 from robot_formation.paths import project_root
 
+pytestmark = pytest.mark.slow
+
 LINE = re.compile(
     r"(?:(?P<robot>follower_\d)  )?timestep +(?P<t>\d+)/(?P<n>\d+)  correction +(?P<correction>[\d.]+) cm  "
     r"formation error +(?P<error>[\d.]+) cm  +[\d.]+ s"

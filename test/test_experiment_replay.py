@@ -18,6 +18,8 @@ from robot_formation.experiment.replay_fine_tuner import replay_fine_tuner
 from robot_formation.launching.processes import run_metadata
 from robot_formation.parameters import ParameterError
 
+pytestmark = pytest.mark.slow
+
 TIMESTEPS = 6
 
 

@@ -9,6 +9,8 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "bench"))
 import fuzz_cases
 import fuzz_inputs
 
+pytestmark = pytest.mark.slow
+
 CASES = 200
 FIRST = 1_000_000  # others than those that the script begins with
 

@@ -11,6 +11,8 @@ from robot_formation.errors import FormationError
 from robot_formation.koopman.predictors import NAMES, PredictionError, Predictor, PredictorParameters
 from robot_formation.koopman.predictors.parameters import ClosingParameters, EdmdParameters, FormationParameters
 
+pytestmark = pytest.mark.slow
+
 VARIANTS = {
     **{name: {"name": name} for name in NAMES},
     "edmd, windowed": {"name": "edmd", "edmd": EdmdParameters(window=5, forgetting=0.9)},

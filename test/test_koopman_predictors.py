@@ -9,6 +9,8 @@ from predictor_helpers import HISTORY, forecasts, predictor, timesteps
 from robot_formation.koopman.predictors import DESCRIPTIONS, MODELS, NAMES, PredictionError, PredictorParameters
 from robot_formation.parameters import specs
 
+pytestmark = pytest.mark.slow
+
 PARTS = ("displacement", "residual", "commanded")
 BOUND = np.array([0.1, 0.2])
 CLOSING = [name for name in NAMES if name.endswith("+close") or name == "formation"]

@@ -21,6 +21,8 @@ from robot_formation.surface import make_surface
 from robot_formation.world import WorldParameters, pose_on_surface
 from robot_formation.world.overhead import OverheadCamera
 
+pytestmark = pytest.mark.slow
+
 BOWL = make_surface("bowl")
 
 

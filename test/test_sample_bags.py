@@ -18,6 +18,8 @@ from robot_formation.experiment.replay import replay_detector, replay_predictor
 from robot_formation.experiment.replay_fine_tuner import replay_fine_tuner
 from robot_formation.names import IMAGE_TYPE, PREDICTION
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "bags" / "samples"
 BAGS = sorted(path.name for path in FOLDER.iterdir() if (path / "metadata.yaml").is_file()) if FOLDER.is_dir() else []

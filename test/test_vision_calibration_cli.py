@@ -26,6 +26,8 @@ from robot_formation.experiment.vision_grid import ANGLES_DEG, Position, measure
 from robot_formation.experiment.vision_table import COLUMNS, VisionTable, read_table
 from robot_formation.vision.block import Block
 
+pytestmark = pytest.mark.slow
+
 QUICK = ("--step", "0.45", "--jobs", "1")
 FILES = {"vision.csv", "vision.json", "vision.yaml", "vision_bag"} | {
     f"vision_{name}.png" for name in ("areas", "pan", "side")

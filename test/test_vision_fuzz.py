@@ -8,6 +8,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent.parent / "bench"))
 from fuzz_detector import Fuzzer, fuzz
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("seed", [11, 12])
 def test_random_messages_images_and_files_are_answered_or_refused_in_one_line(tmp_path, seed):

@@ -11,6 +11,8 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import SURFACES, make_surface
 from robot_formation.world import JointStates, RobotStart, World
 
+pytestmark = pytest.mark.slow
+
 ALONE = (RobotStart("leader", 0.89, 0.89, 0.3, camera=False),)
 RADIUS, ARM = 0.030, 0.110 + 0.095
 MOVES = [(0.2, 0, 0), (-0.2, 0, 0), (0, 0.1, 0), (0, -0.1, 0), (0.1, 0.1, 0), (0.1, -0.1, 0), (0, 0, 0.6), (0, 0, -0.6)]
