@@ -66,5 +66,10 @@ def test_messages_that_were_lost_are_said_in_one_line(tmp_path):
     assert missing_messages(many).endswith(" and 2 more topics")
 
 
+@pytest.mark.parametrize("lost", [5, ["/clock"], {"/clock": "many", "/path": None, "/tf": -1}])
+def test_counts_that_are_none_are_left_out(tmp_path, lost):
+    assert missing_messages(write(tmp_path / "bag", lost=lost)) == ""
+
+
 def test_a_whole_bag_lacks_nothing(tmp_path):
     assert missing_messages(write(tmp_path / "bag")) == ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from robot_formation.bag.formation_bag import formation_namespaces
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
+from robot_formation.bag.run_details import value
 from robot_formation.files import size_text
 
 _DETAILS = ("scenario", "seed", "predictor", "surface", "git_commit", "dropped", "lost")
@@ -77,7 +77,7 @@ class BagInfo:
             "duration_s": (self.end_ns - self.start_ns) / 1e9,
             "messages": self.message_count,
             "topics": [_topic(topic) for topic in self.topics],
-            "metadata": {key: _parsed(text) for key, text in self.details.items()},
+            "metadata": {key: value(text) for key, text in self.details.items()},
             "warnings": list(self.warnings),
         }
 
@@ -149,14 +149,6 @@ def _topic(topic: TopicSummary) -> dict[str, Any]:
 def _qos(topic: TopicSummary) -> str:
     kinds = {f"{profile.reliability} {profile.durability}".replace("_", " ") for profile in topic.profiles}
     return ", ".join(sorted(kinds)) or "unknown"
-
-
-def _parsed(text: str) -> Any:
-    """Read a metadata text that is JSON; others stay texts."""
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        return text
 
 
 def _date(stamp_ns: int, *, simulated: bool) -> str:
