@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any
 
 
 def value(text: str) -> Any:
-    """Read a text that is JSON; one that isn't, or is nested too deep, stays a text."""
+    """Read a text that is JSON; one that isn't, is nested too deep or holds a number that isn't finite, stays a text."""
     try:
-        return json.loads(text)
+        return json.loads(text, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError):
         return text
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is no number that JSON has")
+    return number
 
 
 def mapping(details: Mapping[str, str], key: str) -> dict[str, Any]:
