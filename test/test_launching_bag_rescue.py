@@ -12,6 +12,7 @@ from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.bag.recover import recover
+from robot_formation.bag.run_details import value
 from robot_formation.bag.writer import BagWriter
 from robot_formation.launching import bag_rescue
 from robot_formation.launching.bag_rescue import missing_messages, rescue
@@ -67,6 +68,11 @@ def test_messages_that_were_lost_are_said_in_one_line(tmp_path):
 
 
 @pytest.mark.parametrize("lost", [5, ["/clock"], {"/clock": "many", "/path": None, "/tf": -1}])
+@pytest.mark.parametrize("text", ["1e999", '{"a": NaN}', "[-Infinity]", "[" * 100_000, "9" * 5000])
+def test_what_is_no_strict_json_stays_a_text(text):
+    assert value(text) == text
+
+
 def test_counts_that_are_none_are_left_out(tmp_path, lost):
     assert missing_messages(write(tmp_path / "bag", lost=lost)) == ""
 

@@ -9,7 +9,7 @@ from typing import Any
 
 
 def value(text: str) -> Any:
-    """Read a text that is JSON; one that isn't, is nested too deep or holds a number that isn't finite, stays a text."""
+    """Read a text that is JSON; one that isn't, is nested too deep or holds NaN or infinities, stays a text."""
     try:
         return json.loads(text, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError):
