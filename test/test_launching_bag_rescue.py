@@ -67,12 +67,12 @@ def test_messages_that_were_lost_are_said_in_one_line(tmp_path):
     assert missing_messages(many).endswith(" and 2 more topics")
 
 
-@pytest.mark.parametrize("lost", [5, ["/clock"], {"/clock": "many", "/path": None, "/tf": -1}])
 @pytest.mark.parametrize("text", ["1e999", '{"a": NaN}', "[-Infinity]", "[" * 100_000, "9" * 5000])
 def test_what_is_no_strict_json_stays_a_text(text):
     assert value(text) == text
 
 
+@pytest.mark.parametrize("lost", [5, ["/clock"], {"/clock": "many", "/path": None, "/tf": -1}])
 def test_counts_that_are_none_are_left_out(tmp_path, lost):
     assert missing_messages(write(tmp_path / "bag", lost=lost)) == ""
 
