@@ -46,6 +46,7 @@ setup(
     install_requires=[
         "PyYAML>=6.0.1",
         "joblib>=1.3.2",
+        "lz4>=4.1.0",
         "matplotlib>=3.6.3",
         "mcap>=1.5.0",
         "numpy>=1.26.4",

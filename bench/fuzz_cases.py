@@ -330,6 +330,39 @@ def bag(rng, folder):
     return reading(rng, whole, folder)
 
 
+DETAILS = ("parameters", "versions", "seed", "timesteps", "formation_distance_m", "dropped", "lost", "outcome")
+
+
+def run_details(rng, folder):
+    """A whole bag whose metadata says other things of the run than a run does."""
+    from synthetic_bag import Step, SyntheticRun
+
+    from robot_formation.bag.writer import BagWriter
+
+    groups = {"world": {"robots": ["leader", "follower_1"], "marker.top_m": 0.216}, "fine_tuner": {"mode": "paper"}}
+    odd = (None, 5, -1, 1e300, True, "x", "\ud800", [], [[]], {}, {"a": {}}, *NASTY)
+    for group in groups.values():
+        for name in group:
+            group[name] = pick(rng, odd) if rng.random() < 0.5 else group[name]
+    details = {"scenario": "made up", "seed": "1", "parameters": json.dumps(groups)}
+    for key in DETAILS:
+        way = rng.integers(6)
+        if way == 0:
+            details[key] = pick(rng, (*NASTY, "[" * 100_000, '{"world": ' * 100_000))
+        elif way == 1:
+            details[key] = json.dumps(pick(rng, odd))
+        elif way == 2:
+            details[key] = damaged_text(rng, details.get(key, '{"/clock": 3}'))
+    path = folder / "bag"
+    with BagWriter(path) as writer:
+        texts = {key: text.encode("utf-8", "replace").decode() for key, text in details.items()}
+        writer.write_metadata("robot_formation", texts)
+        run = SyntheticRun(writer)
+        for _ in range(2):
+            run.step(Step(corrections=[(0.001, 0.002)], residual=(0.001, 0.0), prediction=(0.001, 0.05)))
+    return reading(rng, path, folder)
+
+
 def reading(rng, path, folder):
     """A verb that reads a bag."""
     verb = pick(rng, RECEIVERS)
@@ -622,6 +655,7 @@ KINDS = {
     "settings": (settings, 12),
     "log": (log, 10),
     "bag": (bag, 24),
+    "run details": (run_details, 5),
     "packed bag": (packed_bag, 3),
     "picture": (picture, 8),
     "signatures, parameters": (signatures, 8),

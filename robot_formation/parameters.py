@@ -12,7 +12,7 @@ import math
 import re
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -35,12 +35,19 @@ class ParameterError(FormationError):
     """A parameter has an unknown name, a wrong type or a value outside its range; the text says which."""
 
 
+# Parameters that have been given other names, in two tables, since what a file of then means for them differs.
 FORMER_NAMES = {
     "formation.handicap": "formation.initial_loss",
     "precise.filter.calm_misfit": "precise.filter.calm_nis",
     "precise.filter.slip_per_lean": "precise.filter.slip_per_tilt",
 }
-"""Names that parameters had before, which are still taken, and today's."""
+"""Names that parameters had before and today's: the value means the same, so that the former name is still taken."""
+
+RENAMED = {"formation": "formation_namespace"}
+"""Names that parameters had before and today's: the value means another thing now, so that the former name is refused.
+
+The namespace was absolute and is relative to that of the robots by default; and the name is that of a group too.
+"""
 
 
 @dataclass(frozen=True)
@@ -108,6 +115,28 @@ def specs(cls: type, prefix: str = "", *, defaults: Any = None) -> dict[str, Spe
             tuple(meta["known"]),
         )
     return found
+
+
+def todays_names(values: Mapping[str, T], *, where: str = "parameters") -> dict[str, T]:
+    """Name parameters as today: values by dotted names, of which some may be former ones.
+
+    Raises:
+        ParameterError: if a parameter is given by both names.
+    """
+    found: dict[str, T] = {}
+    for name, value in values.items():
+        now = FORMER_NAMES.get(name, name)
+        if now in found:
+            raise ParameterError(f"{where}: '{now}' is given twice, also by a former name; keep one of them")
+        found[now] = value
+    return found
+
+
+def no_parameter(name: str, known: Collection[str]) -> str:
+    """Say that there is no parameter of this name, and which one was probably meant."""
+    now = RENAMED.get(name, "")
+    hint = f"; it is called '{now}' now" if now in known else suggestion(name, known)
+    return f"no parameter '{name}'{hint}"
 
 
 def flatten(values: Mapping[str, Any], prefix: str = "", *, where: str = "parameters") -> dict[str, Any]:

@@ -36,6 +36,23 @@ def test_a_bag_that_says_nothing_or_nonsense_has_unknown_conditions(text):
     assert conditions_text(facts["conditions"]) == ""
 
 
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        '{"world": {"robots": 5, "camera.mode": ["x"], "marker.kind": {"a": 1}}, "fine_tuner": {"mode": "\\ud800"}}',
+        '{"world": ' * 100_000,
+        "[" * 100_000,
+        '{"world": {"robots": ' + "9" * 5000 + "}}",
+    ],
+    ids=["wrong types", "deep mappings", "deep lists", "a huge number"],
+)
+def test_a_bag_whose_metadata_was_made_up_has_unknown_conditions(parameters):
+    facts = run_facts({"parameters": parameters, "seed": "9" * 5000})
+    assert set(facts["conditions"].values()) == {None}
+    assert facts["seed"] is None
+    assert conditions_text(facts["conditions"]) == ""
+
+
 def test_what_nearly_every_run_has_is_not_said():
     assert conditions_text({"mode": "precise", "camera": "stream", **COMMON}) == "alignment precise, camera stream"
     assert conditions({}) == {"mode": None, "camera": None, **dict.fromkeys(COMMON)}

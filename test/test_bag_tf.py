@@ -168,6 +168,25 @@ def test_a_topic_of_the_recorders_own_keeps_its_type(tmp_path):
     recorder.close()
 
 
+def test_poses_that_cannot_be_decoded_give_no_transforms(tmp_path):
+    with_robot = Recorder(tmp_path / "bag", {})
+    with_robot.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
+    for data in (b"\x00\x01\x00\x00", b"\x00\x01\x00\x00" + b"\xff" * 40):
+        with_robot.record("/ground_truth/leader/odom", ODOMETRY, data, 5)
+    with_robot.close()
+    with read_bag(tmp_path / "bag") as opened:
+        assert [message.topic for message in opened.raw_messages(opened.topics)] == ["/ground_truth/leader/odom"] * 2
+
+
+def test_a_topic_of_another_type_that_was_there_first_keeps_its_messages(tmp_path):
+    recorder = Recorder(tmp_path / "bag", {})
+    recorder.add_topic("/tf", STRING, TopicQos())
+    recorder.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
+    recorder.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(10**9, 1.0, 0.0, 0.0)))
+    recorder.close()
+    assert messages_of(tmp_path / "bag", "/tf") == []
+
+
 def test_each_formations_transforms_lie_in_its_namespace():
     made = Transforms()
     for namespace, x in (("", 0.1), ("/site_a", 0.2)):

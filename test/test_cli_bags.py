@@ -93,6 +93,12 @@ def test_dates_of_a_clock_and_an_empty_bag_are_not_called_simulated(tmp_path, ca
     assert "simulated" not in told(capsys, "info", tmp_path / "bag")
 
 
+def test_early_times_of_no_run_are_simulated_or_of_a_clock_that_was_not_set(tmp_path, capsys):
+    bag = foreign(tmp_path / "foreign", StoragePlugin.MCAP)
+    assert json.loads(told(capsys, "info", bag, "--json"))["simulated_time"] is None
+    assert told(capsys, "info", bag).count("simulated time or a clock that was not set") == 2
+
+
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
 def test_bags_of_another_make_are_summarised(tmp_path, capsys, plugin):
     bag = foreign(tmp_path / "foreign", plugin)

@@ -104,6 +104,11 @@ def test_predictors_come_in_the_order_named_once_each(capsys, log):
     assert list(forecasts(capsys, log, *options)) == ["ewma+close", "previous"]
 
 
+def test_predictor_is_an_option_and_no_abbreviation_that_another_option_could_take(capsys, log):
+    assert "argument --predictor: takes one or several" in complaint(capsys, log, "--predictor", ",")
+    assert list(forecasts(capsys, log, "--predictor", "ewma", "--predictors", "previous")) == ["ewma", "previous"]
+
+
 @pytest.mark.parametrize("option", ["--predictors", "--predictor"])
 def test_predictors_may_be_listed_with_commas(capsys, log, option):
     assert list(forecasts(capsys, log, option, "ewma+close,previous", option, "previous,literal")) == [

@@ -26,6 +26,7 @@ from robot_formation.bag.writer import BagWriter
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("bags")]
 
 STRING, TICK, IMAGE = "std_msgs/msg/String", "std_msgs/msg/UInt32", "sensor_msgs/msg/Image"
+ODOMETRY = "nav_msgs/msg/Odometry"
 RELIABLE = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(
     history=HistoryPolicy.KEEP_ALL,
@@ -247,6 +248,39 @@ def test_a_type_that_is_not_that_of_a_topic_made_by_the_recorder_is_told(lab, tm
     )
     lab.until(publishers[1].get_subscription_count)
     assert lab.end(recorder)["topics"] == {"/words": 0}
+
+
+def test_topics_called_tf_elsewhere_are_recorded_with_any_type_unless_a_formation_is_there(lab, tmp_path):
+    odometry = conversions.message_class(ODOMETRY)
+    odom = lab.node.create_publisher(odometry, "/site/ground_truth/leader/odom", RELIABLE)
+    recorder = lab.record("/camera/tf", "/site/ground_truth/leader/odom", "/site/tf", "-o", tmp_path / "bag")
+    lab.until(odom.get_subscription_count)
+    others = [lab.node.create_publisher(String, name, RELIABLE) for name in ("/camera/tf", "/site/tf")]
+    lab.until(others[0].get_subscription_count)
+    lines = [recorder.stderr.readline() for _ in range(3)]
+    assert any("/site/tf is not recorded: its type is std_msgs/msg/String" in line for line in lines), lines
+    others[0].publish(String(data="hello"))
+    odom.publish(odometry())
+    assert lab.end(recorder)["topics"]["/camera/tf"] == 1
+
+
+def test_diagnostics_that_cannot_be_decoded_do_not_end_a_recorder_in_a_namespace(lab, tmp_path):
+    options = [f"path:={tmp_path / 'bag'}", "own_namespace:=true"]
+    recorder = lab.start("recorder", *(word for option in options for word in ("-p", option)), namespace="/site")
+    kind = conversions.message_class(names.DIAGNOSTICS.type)
+    diagnostics = lab.node.create_publisher(kind, "/diagnostics", RELIABLE)
+    words = lab.node.create_publisher(String, "/site/words", RELIABLE)
+    lab.until(lambda: diagnostics.get_subscription_count() and words.get_subscription_count())
+    diagnostics.publish(b"\x00\x01\x00\x00" + b"\xff" * 40)
+    words.publish(String(data="hello"))
+    diagnostics.wait_for_all_acked()
+    words.wait_for_all_acked()
+    recorder.terminate()
+    _, errors = recorder.communicate(timeout=60)
+    assert recorder.returncode == 0, errors
+    found = payloads(tmp_path / "bag")
+    assert len(found["/site/words"]) == 1
+    assert not found.get("/diagnostics")
 
 
 @pytest.mark.parametrize("size", [3000, 20_000])

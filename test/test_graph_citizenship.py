@@ -248,6 +248,20 @@ def test_parameters_are_set_or_refused_with_a_reason(site, node, name, value, sa
         assert site.parameters(node)[name] == value
 
 
+def test_a_parameter_is_set_by_its_former_name_too(site):
+    today = site.parameters("predictor")["formation.initial_loss"]
+    assert site.set("predictor", "formation.handicap", today).successful
+    pair = [Parameter(f"formation.{name}", value=today) for name in ("handicap", "initial_loss")]
+    (result,) = {
+        (answer.successful, answer.reason)
+        for answer in [site.answer(site.client("predictor").set_parameters_atomically(pair)).result]
+    }
+    assert result == (
+        False,
+        "predictor: 'formation.initial_loss' is given twice, also by a former name; keep one of them",
+    )
+
+
 @pytest.mark.parametrize("node", NAMESPACES)
 def test_param_load_takes_what_param_dump_gave(site, node):
     parameters = [as_typed(name, value) for name, value in site.parameters(node).items()]
@@ -272,6 +286,14 @@ def test_a_parameter_by_its_old_name_is_refused_with_the_new_one(lab):
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 2
         assert "no parameter 'formation'; it is called 'formation_namespace' now" in errors
+
+
+def test_a_parameter_by_its_former_name_too_is_refused(lab):
+    both = ["-p", "formation.handicap:=2.0", "-p", "formation.initial_loss:=1.0"]
+    process = lab.start("predictor", *both, namespace="/follower_1")
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "'formation.initial_loss' is given twice" in errors
 
 
 def test_a_best_effort_camera_is_heard_where_its_user_says_so(lab):

@@ -3,7 +3,8 @@
 import pytest
 
 from robot_formation.errors import FormationError
-from robot_formation.launching.arguments import ARGUMENTS, scenario_of, split_settings
+from robot_formation.launching import arguments
+from robot_formation.launching.arguments import ARGUMENTS, rviz_remappings, scenario_of, split_settings
 
 
 def scenario(**values):
@@ -57,3 +58,20 @@ def test_a_complaint_names_the_argument(name, value, says):
         scenario(**{name: value})
     assert says in str(error.value)
     assert "--set" not in str(error.value)
+
+
+def test_the_viewers_topics_are_remapped_into_the_namespace():
+    found = dict(rviz_remappings("/site"))
+    assert {"/tf", "/tf_static", "/clock"} < set(found)
+    assert all(there == f"/site{topic}" for topic, there in found.items())
+    assert rviz_remappings("/") == []
+
+
+@pytest.mark.parametrize("content", [None, "", "Visualization Manager: 3", "{a: 1, a: 2}"])
+def test_displays_that_are_missing_or_broken_are_told_in_one_line(tmp_path, monkeypatch, content):
+    file = tmp_path / "formation.rviz"
+    monkeypatch.setattr(arguments, "rviz_config", lambda: file)
+    if content is not None:
+        file.write_text(content)
+    with pytest.raises(FormationError, match=r"^\S*formation\.rviz: [^\n]*$"):
+        rviz_remappings("/site")

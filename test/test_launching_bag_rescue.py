@@ -12,6 +12,7 @@ from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.bag.recover import recover
+from robot_formation.bag.run_details import value
 from robot_formation.bag.writer import BagWriter
 from robot_formation.launching import bag_rescue
 from robot_formation.launching.bag_rescue import missing_messages, rescue
@@ -86,6 +87,16 @@ def test_messages_that_were_lost_are_said_in_one_line(tmp_path):
     assert missing_messages(bag) == "the bag lacks 6 messages that were lost on the way: /path (5), /clock (1)"
     many = write(tmp_path / "many", lost={f"/topic_{number}": 1 for number in range(7)})
     assert missing_messages(many).endswith(" and 2 more topics")
+
+
+@pytest.mark.parametrize("text", ["1e999", '{"a": NaN}', "[-Infinity]", "[" * 100_000, "9" * 5000])
+def test_what_is_no_strict_json_stays_a_text(text):
+    assert value(text) == text
+
+
+@pytest.mark.parametrize("lost", [5, ["/clock"], {"/clock": "many", "/path": None, "/tf": -1}])
+def test_counts_that_are_none_are_left_out(tmp_path, lost):
+    assert missing_messages(write(tmp_path / "bag", lost=lost)) == ""
 
 
 def test_a_whole_bag_lacks_nothing(tmp_path):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from graph_tools import short_scenario
 
 from robot_formation import conversions, names
 from robot_formation.analysis.from_bag import load_run
+from robot_formation.analysis.from_bag import record_of as record_of_messages
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.report import text_report, to_json, write_pictures
 from robot_formation.components.base import Place
@@ -179,3 +181,31 @@ def test_colour_pictures_are_taken_and_others_refused():
 def test_robots_without_a_start_are_refused():
     with pytest.raises(ParameterError, match="start_x_m"):
         dataclasses.replace(OverheadTrackerNodeParameters(), robots=("leader",))
+
+
+def stamped(second, **fields):
+    stamp = SimpleNamespace(sec=second, nanosec=0)
+    return SimpleNamespace(header=SimpleNamespace(stamp=stamp), **fields)
+
+
+def pose(x):
+    turn = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=1.0)
+    return SimpleNamespace(position=SimpleNamespace(x=x, y=0.0, z=0.216), orientation=turn)
+
+
+def test_a_robot_that_the_camera_never_saw_has_no_error_and_one_seen_late_none_before():
+    told = {"leader": [0.1, 0.11, 0.12, 0.12], "follower_1": [0.5] * 4, "follower_2": [0.7, 0.7, 0.71, 0.72]}
+    messages = {
+        "/overhead/poses": [
+            stamped(second, poses=[pose(places[second]) for places in told.values()]) for second in range(4)
+        ],
+        **{
+            f"/ground_truth/{robot}/odom": [stamped(0, pose=SimpleNamespace(pose=pose(places[0])))]
+            for robot, places in told.items()
+        },
+    }
+    overhead = record_of_messages(list(told), messages, {}).overhead
+    assert {robot: list(track.seen_m[:, 0]) for robot, track in overhead.items()} == {
+        "leader": [0.1, 0.11, 0.12],
+        "follower_2": [0.71, 0.72],
+    }

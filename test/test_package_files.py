@@ -87,7 +87,7 @@ def test_package_xml_names_every_ros_package_that_is_imported(package_xml):
 
 def test_every_requirement_has_a_rosdep_key_that_brings_it(package_xml, setup_arguments):
     brings = {
-        "mcap-ros2-support": {"mcap", "zstandard"},
+        "mcap-ros2-support": {"mcap", "lz4", "zstandard"},
         "python3-opencv": {"opencv-python-headless"},
         "python3-pil": {"pillow"},
         "python3-yaml": {"PyYAML"},

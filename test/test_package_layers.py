@@ -110,6 +110,12 @@ def test_only_the_world_imports_pybullet():
     assert {area_of(module) for module in importers} <= {"world"}
 
 
+def test_yaml_is_parsed_in_one_place():
+    parses = re.compile(r"\byaml\.(\w*load\w*|parse|scan|compose\w*|\w*Loader)\b")
+    files = [*FILES, *(PACKAGE.parent / "launch").glob("*.py")]
+    assert {file.name for file in files if parses.search(file.read_text())} == {"yaml_files.py"}
+
+
 @pytest.mark.parametrize("area", ["analysis", "bag", "control", "koopman", "surface", "vision", "world"])
 def test_these_parts_need_no_ros_not_even_indirectly(area):
     modules = [module for module in GRAPH if area_of(module) == area]

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
+from robot_formation.bag.run_details import node_parameters, whole_number
+
+_SEED_DIGITS = 19  # of 2^63 - 1
+
 
 def conditions(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """List the conditions of a run by name; None where unknown.
+    """List the conditions of a run by name; None where unknown, or where no run has such a value.
 
     Args:
         parameters: those of the run's nodes, flat, by kind of node; kinds may be missing.
@@ -16,11 +19,11 @@ def conditions(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     world, fine_tuner = parameters.get("world", {}), parameters.get("fine_tuner", {})
     robots = world.get("robots")
     return {
-        "mode": fine_tuner.get("mode"),
-        "camera": world.get("camera.mode"),
-        "marker": world.get("marker.kind"),
-        "followers": len(robots) - 1 if robots else None,
-        "drive_mode": world.get("motor.drive_mode"),
+        "mode": _word(fine_tuner.get("mode")),
+        "camera": _word(world.get("camera.mode")),
+        "marker": _word(world.get("marker.kind")),
+        "followers": len(robots) - 1 if isinstance(robots, (list, tuple)) and robots else None,
+        "drive_mode": _word(world.get("motor.drive_mode")),
     }
 
 
@@ -40,15 +43,9 @@ def conditions_text(found: Mapping[str, Any]) -> str:
     return ", ".join(said)
 
 
-def recorded_parameters(details: Mapping[str, str]) -> dict[str, dict[str, Any]]:
-    """Read the nodes' parameters out of what a run says of itself; empty where it says none or nonsense."""
-    try:
-        found = json.loads(details.get("parameters", "{}"))
-    except ValueError:
-        return {}
-    if not isinstance(found, dict):
-        return {}
-    return {kind: values for kind, values in found.items() if isinstance(values, dict)}
+def _word(found: Any) -> str | None:
+    """Return a choice's name; None if it can be none, so that nothing else is printed."""
+    return found if isinstance(found, str) and found.isascii() and found.isidentifier() else None
 
 
 def run_facts(details: Mapping[str, str], *, in_process: bool | None = None) -> dict[str, Any]:
@@ -58,10 +55,9 @@ def run_facts(details: Mapping[str, str], *, in_process: bool | None = None) -> 
         details: what the run says of itself, as `launching.processes.run_metadata` puts it.
         in_process: whether it ran in one process, which it doesn't say.
     """
-    seed = details.get("seed", "")
     return {
-        "seed": int(seed) if seed.isascii() and seed.isdigit() else None,
+        "seed": whole_number(details, "seed", _SEED_DIGITS),
         "predictor": details.get("predictor"),
         "surface": details.get("surface"),
-        "conditions": {**conditions(recorded_parameters(details)), "in_process": in_process},
+        "conditions": {**conditions(node_parameters(details)), "in_process": in_process},
     }

@@ -229,7 +229,9 @@ def _overhead(
     """Compare where the tracker saw each robot's dot with the dot's true places.
 
     The tracker tells the places of all robots after each picture, in their order. One that it doesn't see keeps its
-    place to the last bit; one that it sees never does, since pictures are noisy.
+    place to the last bit; one that it sees never does, since pictures are noisy. The first place that it tells may be
+    where it was told that the robot starts: it counts only if the second picture has changed it. A robot that is never
+    seen has no track.
     """
     told = sorted(messages[names.absolute("", names.OVERHEAD_POSES.name)], key=_stamp_ns)
     told = [message for message in told if len(message.poses) == len(robots)]
@@ -239,7 +241,10 @@ def _overhead(
         if not told or not truth:
             continue
         places = np.array([_place(message.poses[number].position) for message in told])
-        moved = np.append(True, np.any(places[1:] != places[:-1], axis=1))
+        moved = np.append(False, np.any(places[1:] != places[:-1], axis=1))
+        if not moved.any():
+            continue
+        moved[0] = moved[1]
         stamps = np.array([_stamp_ns(message) for message in told], dtype=np.int64)[moved]
         seen = places[moved]
         true_stamps = np.array([_stamp_ns(message) for message in truth], dtype=np.int64)

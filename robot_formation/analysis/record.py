@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.bag.run_details import node_parameters, whole_number
 from robot_formation.control.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 
@@ -140,15 +139,14 @@ class RunRecord:
     @property
     def timesteps_planned(self) -> int | None:
         """Timesteps that the scenario has, if the run says."""
-        text = self.details.get("timesteps", "")
-        return int(text) if re.fullmatch("[0-9]{1,9}", text) else None
+        return whole_number(self.details, "timesteps", 9)
 
     @property
     def dot_height_m(self) -> float:
         """Height of the reference dot above base_link, metres: what the run says, else the paper's robot's."""
         try:
-            said = float(json.loads(self.details["parameters"])["world"]["marker.top_m"])
-        except (KeyError, ValueError, TypeError, OverflowError, RecursionError):
+            said = float(node_parameters(self.details)["world"]["marker.top_m"])
+        except (KeyError, ValueError, TypeError, OverflowError):
             return DOT_HEIGHT_M
         return said if math.isfinite(said) else DOT_HEIGHT_M
 

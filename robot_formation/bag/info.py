@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +12,11 @@ from robot_formation.bag.formation_bag import formation_namespaces
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
+from robot_formation.bag.run_details import value
 from robot_formation.files import size_text
 
 _DETAILS = ("scenario", "seed", "predictor", "surface", "git_commit", "dropped", "lost")
-_EARLIEST_DATE_NS = 10**18  # September 2001: no clock of a ROS robot has shown an earlier date
+_EARLIEST_DATE_NS = 10**18  # September 2001: no clock of a ROS robot that was set has shown an earlier date
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,15 @@ class BagInfo:
         return sum(topic.message_count for topic in self.topics)
 
     @property
-    def simulated_time(self) -> bool:
-        """Whether the log times are a simulation's seconds since its start, and no dates."""
-        return self.message_count > 0 and self.end_ns < _EARLIEST_DATE_NS
+    def simulated_time(self) -> bool | None:
+        """Whether the log times are a simulation's seconds since its start, and no dates.
+
+        None where they are early, but nothing says that a run was recorded: a board without a battery for its clock
+        starts in 1970.
+        """
+        if self.message_count == 0 or self.end_ns >= _EARLIEST_DATE_NS:
+            return False
+        return True if "scenario" in self.details else None
 
     def to_mapping(self) -> dict[str, Any]:
         """Return what `--json` prints."""
@@ -77,7 +83,7 @@ class BagInfo:
             "duration_s": (self.end_ns - self.start_ns) / 1e9,
             "messages": self.message_count,
             "topics": [_topic(topic) for topic in self.topics],
-            "metadata": {key: _parsed(text) for key, text in self.details.items()},
+            "metadata": {key: value(text) for key, text in self.details.items()},
             "warnings": list(self.warnings),
         }
 
@@ -110,8 +116,8 @@ def info_text(info: BagInfo) -> str:
         ("Storage id", f"{info.storage}, compression {info.compression}"),
         ("ROS Distro", info.ros_distro or "unknown"),
         ("Duration", f"{(info.end_ns - info.start_ns) / 1e9:.9f}s"),
-        ("Start", _date(info.start_ns, simulated=info.simulated_time)),
-        ("End", _date(info.end_ns, simulated=info.simulated_time)),
+        ("Start", _date(info.start_ns, info.simulated_time)),
+        ("End", _date(info.end_ns, info.simulated_time)),
         ("Messages", str(info.message_count)),
         *((key, info.details[key]) for key in _DETAILS if info.details.get(key)),
     ]
@@ -151,15 +157,8 @@ def _qos(topic: TopicSummary) -> str:
     return ", ".join(sorted(kinds)) or "unknown"
 
 
-def _parsed(text: str) -> Any:
-    """Read a metadata text that is JSON; others stay texts."""
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        return text
-
-
-def _date(stamp_ns: int, *, simulated: bool) -> str:
+def _date(stamp_ns: int, simulated: bool | None) -> str:
     seconds, nanoseconds = divmod(stamp_ns, 10**9)
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.gmtime(seconds))
-    return f"{when} UTC ({seconds}.{nanoseconds:09d}){', simulated time' if simulated else ''}"
+    note = {True: ", simulated time", None: ", simulated time or a clock that was not set"}.get(simulated, "")
+    return f"{when} UTC ({seconds}.{nanoseconds:09d}){note}"

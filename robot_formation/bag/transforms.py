@@ -51,12 +51,21 @@ class Transforms:
         """Tell whether messages of a topic say where frames are."""
         return _matched(topic, type_name) is not None
 
+    @staticmethod
+    def made_of(topic: str, type_name: str) -> dict[str, str]:
+        """Name the topics that are made of a topic's messages, absolute, with their types; none if it isn't used."""
+        match = _matched(topic, type_name)
+        return {} if match is None else made_in(match[1])
+
     def make(self) -> Iterator[TransformMessage]:
         """Make the transforms of what was taken since the last time."""
         taken, self._taken = self._taken, []
         new: defaultdict[str, list[int]] = defaultdict(list)
         for namespace, robot, type_name, cdr, stamp_ns in taken:
-            message = jazzy_typestore().deserialize_cdr(cdr, type_name)
+            try:
+                message = jazzy_typestore().deserialize_cdr(cdr, type_name)
+            except Exception:  # the decoder has no error of its own; what can't be read says of no frame where it is
+                continue
             if type_name == _STRING:
                 fixed = list(_of_description(robot, message.data))
             else:
@@ -70,6 +79,11 @@ class Transforms:
         # All of them each time: whoever asks for the latest message on a latched topic gets one only.
         for namespace, stamps in new.items():
             yield _message(_inside(namespace, names.TF_STATIC), list(self._static[namespace].values()), min(stamps))
+
+
+def made_in(namespace: str) -> dict[str, str]:
+    """Name the topics that are made for a formation in a namespace ('' or '/': the root), with their types."""
+    return {made.name: made.type for made in (_inside(namespace.rstrip("/"), t) for t in (names.TF, names.TF_STATIC))}
 
 
 def _matched(topic: str, type_name: str) -> re.Match[str] | None:

@@ -50,6 +50,8 @@ def add_parser(subparsers: Any) -> None:
         default=(),
         help="previous, measured, ewma+close, ...; may be repeated (default: all of 'formation list predictors')",
     )
+    # As 'formation run' calls it. Listed once only.
+    parser.add_argument("--predictor", dest="predictors", action=Names, default=(), help=argparse.SUPPRESS)
     parser.add_argument(
         "--set",
         metavar="KEY=VALUE",

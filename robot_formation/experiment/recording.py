@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -13,6 +12,7 @@ from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.bag.reader import Bag
 from robot_formation.bag.recorder import METADATA_NAME
+from robot_formation.bag.run_details import mapping, node_parameters
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import node_defaults
@@ -39,9 +39,8 @@ class Recording:
         if not self.followers:
             raise BagError(f"{bag.path} has no topics of a follower; give the bag of 'formation run'")
         details = bag.metadata(METADATA_NAME)
-        parameters = _parsed(details.get("parameters", ""))
-        self._parameters = {kind: values for kind, values in parameters.items() if isinstance(values, dict)}
-        self.notes = _changes({**_parsed(details.get("versions", "")), "commit": details.get("git_commit", "")})
+        self._parameters = node_parameters(details)
+        self.notes = _changes({**mapping(details, "versions"), "commit": details.get("git_commit", "")})
         if not self._parameters:
             self.notes.append("the bag doesn't tell the nodes' parameters: those of config/ are taken")
 
@@ -116,14 +115,6 @@ def equal(recorded: Sequence[Any], today: Sequence[Any]) -> bool:
     Not their serialised form: what lies between its fields is not defined.
     """
     return list(recorded) == list(today)
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    try:
-        found = json.loads(text)
-    except (ValueError, RecursionError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _changes(recorded: dict[str, str]) -> list[str]:

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.loopback import PROFILES, RANGE, use_loopback
 from robot_formation.paths import config_dir
+from robot_formation.yaml_files import read_yaml
 
 _SWITCH = ("true", "false", "True", "False", "1", "0")
 _OPENING, _CLOSING = "[{", "]}"
@@ -126,10 +125,18 @@ def rviz_config() -> Path:
 
 
 def rviz_remappings(namespace: str) -> list[tuple[str, str]]:
-    """List what the viewer has to remap for a formation in a namespace ('' or absolute)."""
+    """List what the viewer has to remap for a formation in a namespace ('' or absolute).
+
+    Raises:
+        FormationError: the file of the displays can't be read or holds none.
+    """
     if not namespace.strip("/"):
         return []
-    displays = yaml.safe_load(rviz_config().read_text(encoding="utf-8"))["Visualization Manager"]["Displays"]
+    file, remedy = rviz_config(), "install the package again"
+    try:
+        displays = read_yaml(file, refuse=FormationError, remedy=remedy)["Visualization Manager"]["Displays"]
+    except (KeyError, TypeError):
+        raise FormationError(f"{file}: holds no displays of RViz; {remedy}") from None
     topics = dict.fromkeys(["/tf", "/tf_static", "/clock", *_topics(displays)])
     return [(topic, f"{namespace.rstrip('/')}{topic}") for topic in topics]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -12,6 +11,7 @@ from robot_formation.bag.place import CUT_OFF_SUFFIX, PARTIAL_SUFFIX
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.bag.recover import recover
+from robot_formation.bag.run_details import counts
 
 _MOST_TOPICS = 5
 
@@ -56,11 +56,11 @@ def missing_messages(bag: Path) -> str:
     """
     with read_bag(bag, allow_empty=True) as opened:
         details = opened.metadata(METADATA_NAME)
-    counts: Counter[str] = Counter()
+    missing: Counter[str] = Counter()
     for key in ("dropped", "lost"):
-        counts.update(json.loads(details.get(key, "{}")))
-    if not counts:
+        missing.update(counts(details, key))
+    if not missing:
         return ""
-    topics = [f"{topic} ({count})" for topic, count in counts.most_common(_MOST_TOPICS)]
-    more = f" and {len(counts) - _MOST_TOPICS} more topics" if len(counts) > _MOST_TOPICS else ""
-    return f"the bag lacks {counts.total()} messages that were lost on the way: {', '.join(topics)}{more}"
+    topics = [f"{topic} ({count})" for topic, count in missing.most_common(_MOST_TOPICS)]
+    more = f" and {len(missing) - _MOST_TOPICS} more topics" if len(missing) > _MOST_TOPICS else ""
+    return f"the bag lacks {missing.total()} messages that were lost on the way: {', '.join(topics)}{more}"

@@ -13,14 +13,15 @@ from rclpy.parameter import Parameter
 
 from robot_formation.errors import FormationError
 from robot_formation.parameters import (
-    FORMER_NAMES,
     ParameterError,
     Spec,
     from_mapping,
+    no_parameter,
     parameter,
     specs,
     suggestion,
     to_mapping,
+    todays_names,
 )
 
 T = TypeVar("T")
@@ -38,8 +39,6 @@ _TYPES: dict[Any, Parameter.Type] = {
     tuple[str, ...]: Parameter.Type.STRING_ARRAY,
 }
 _LARGE = 1e308
-# Names that parameters had before, of which no suggestion by spelling is sure to find the new one.
-_RENAMED = {"formation": "formation_namespace"}
 AT_START = "it is used while the node starts"
 """Why the parameters that all nodes have can't be set later."""
 
@@ -83,11 +82,15 @@ class ParameterNode(Node):
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """See rclpy's Node; both of its services for setting parameters come here."""
         changes = []
-        for given in parameter_list:
-            if not self.has_parameter(given.name):
-                return _refused(f"no parameter '{given.name}'{suggestion(given.name, self._parameters)}")
-            current = self.get_parameter(given.name)
-            item = _like(current, given)
+        try:
+            values = todays_names({item.name: item for item in parameter_list}, where=self.get_name())
+        except ParameterError as error:
+            return _refused(str(error))
+        for name, given in values.items():
+            if not self.has_parameter(name):
+                return _refused(no_parameter(name, self._parameters))
+            current = self.get_parameter(name)
+            item = _like(current, Parameter(name, given.type_, given.value))
             if not self.describe_parameter(item.name).read_only:
                 changes.append(item)
             elif _bare(item.value) != _bare(current.value):
@@ -133,16 +136,11 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
     known: dict[str, Spec] = {}
     for cls in classes:
         known.update(specs(cls))
-    given = {
-        FORMER_NAMES.get(name, name): value
-        for name, value in node._parameter_overrides.items()
-        if not name.startswith(_OF_RCLPY)
-    }
+    overrides = {name: item for name, item in node._parameter_overrides.items() if not name.startswith(_OF_RCLPY)}
+    given = todays_names(overrides, where=where)
     for name in given:
         if name not in known:
-            now = _RENAMED.get(name, "")
-            hint = f"; it is called '{now}' now" if now in known else suggestion(name, known)
-            raise ParameterError(f"{where}: no parameter '{name}'{hint}")
+            raise ParameterError(f"{where}: {no_parameter(name, known)}")
     values = {name: _plain(known[name], item.value) for name, item in given.items()}
     objects: list[Any] = []
     for cls in classes:

@@ -23,6 +23,7 @@ from robot_formation.bag.mcap_file import CHUNK_BYTES
 from robot_formation.bag.recorder import Recorder
 from robot_formation.bag.recording_queue import QUEUE_BYTES, RecordingQueue
 from robot_formation.bag.selection import Selection
+from robot_formation.bag.transforms import Transforms, made_in
 from robot_formation.bag.writer import WriteOptions
 from robot_formation.nodes.executor import make_executor
 from robot_formation.nodes.intake import Intake
@@ -36,8 +37,6 @@ from robot_formation.parameters import ParameterError, parameter
 _DISCOVERY_S = 0.05
 _REVIEW_S = 1.0
 _TICK_TYPE = "std_msgs/msg/UInt32"
-# By their names' last parts: what the bag's recorder makes of true poses, in every formation's namespace.
-_MADE_HERE = {topic.name.lstrip("/"): topic.type for topic in (names.TF, names.TF_STATIC)}
 _AFTER_TICK_S = 0.01  # what belongs to a timestep arrives well within this after its tick
 _IDLE_S = 0.05
 _OLDEST_CHUNK_S = 1.0
@@ -156,6 +155,8 @@ class RecorderNode:
         self._queue = RecordingQueue(self._recorder, parameters.queue_bytes)
         self._receive_time = parameters.time == "receive"
         self._subscribed: dict[str, Intake] = {}
+        # Topics that the bag's recorder makes itself of true poses, or is likely to, and their types.
+        self._made = {**made_in(""), **made_in(node.get_namespace())}
         self._ignored: set[str] = set()
         self._refused: set[tuple[int, ...]] = set()
         self._told_dropped = 0
@@ -233,7 +234,7 @@ class RecorderNode:
 
     def _subscribe(self, name: str, types: list[str], infos: list[TopicEndpointInfo]) -> None:
         type_name = types[0]
-        made = _MADE_HERE.get(name.rpartition("/")[2], type_name)
+        made = self._made.get(name, type_name)
         if type_name != made:
             self._ignored.add(name)
             self._warn(f"{name} is not recorded: its type is {type_name} instead of {made}")
@@ -249,6 +250,7 @@ class RecorderNode:
             self._warn(f"{name} has several types; only {type_name} is recorded")
         if any(str(info.topic_type_hash) not in (what.type_hash, "INVALID") for info in infos):
             self._warn(f"{name} is published with another version of {type_name}: its definition in the bag won't fit")
+        self._made.update(Transforms.made_of(name, type_name))
         profiles = tuple(offered(info) for info in infos)
         self._queue.call(partial(self._recorder.add_topic, name, type_name, profiles, embedded=what))
         take = partial(self._on_message, name, type_name)
@@ -272,7 +274,10 @@ class RecorderNode:
         namespace = self._selection.namespace
         if not namespace or topic != names.DIAGNOSTICS.name or topic in self._selection.topics:
             return False
-        reports = conversions.from_cdr(data, names.DIAGNOSTICS.type).status
+        try:
+            reports = conversions.from_cdr(data, names.DIAGNOSTICS.type).status
+        except Exception:  # the middleware's decoders have no common error
+            return True
         return not any(report.name.startswith(f"{namespace}/") for report in reports)
 
     def _keep(self, key: str, text: str) -> None:

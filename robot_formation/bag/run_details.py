@@ -1,0 +1,45 @@
+"""What a run says of itself in its bag's metadata: texts from outside, which may be anything."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+
+def value(text: str) -> Any:
+    """Read a text that is JSON; one that isn't, is nested too deep or holds NaN or infinities, stays a text."""
+    try:
+        return json.loads(text, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError):
+        return text
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is no number that JSON has")
+    return number
+
+
+def mapping(details: Mapping[str, str], key: str) -> dict[str, Any]:
+    """Read a JSON object; empty where it is missing or something else."""
+    found = value(details.get(key, ""))
+    return found if isinstance(found, dict) else {}
+
+
+def node_parameters(details: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """Read the parameters of the run's nodes, flat, by kind of node; empty where it says none or nonsense."""
+    return {kind: found for kind, found in mapping(details, "parameters").items() if isinstance(found, dict)}
+
+
+def whole_number(details: Mapping[str, str], key: str, digits: int) -> int | None:
+    """Read a number from 0 with at most so many digits; None where it is missing or something else."""
+    text = details.get(key, "")
+    return int(text) if text.isascii() and text.isdigit() and len(text) <= digits else None
+
+
+def counts(details: Mapping[str, str], key: str) -> dict[str, int]:
+    """Read how often each of some topics was counted; what is no count from 1 is left out."""
+    return {topic: count for topic, count in mapping(details, key).items() if type(count) is int and count > 0}
