@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from tag_helpers import needs_tags
 from vision_helpers import DATA, EXAMPLES, GROUPS, PARAMETERS, canvas, picture
 
 from robot_formation.cli import detect, teach
@@ -255,6 +256,7 @@ def test_wrong_usage_ends_with_exit_code_2(words, capsys):
     assert ended.value.code == 2
 
 
+@needs_tags
 def test_detect_finds_the_faces_of_a_marker_of_tags_without_signatures(files, capsys):
     world = WorldParameters(marker=MarkerParameters(kind="tags"))
     images = [write_png(files / f"{face}.png", marker_picture(world, face)) for face in ("target", "front", "rear")]
