@@ -77,7 +77,7 @@ setup(
     entry_points={
         "console_scripts": [
             "formation = robot_formation.cli.__main__:main",
-            *(f"{node} = {NAME}.nodes.{node}:main" for node in NODES),
+            *(f"{node} = {NAME}.nodes.executables:{node}" for node in NODES),
         ]
     },
     zip_safe=False,

@@ -14,9 +14,7 @@ from pathlib import Path
 
 from joblib import Parallel, delayed
 
-from robot_formation.cli.sweep import with_progress
-from robot_formation.errors import FormationError
-from robot_formation.experiment.alignment_grid import (
+from bench.alignment_grid import (
     equipment,
     faces_seen,
     read_rows,
@@ -26,6 +24,8 @@ from robot_formation.experiment.alignment_grid import (
     summarise,
     write_rows,
 )
+from robot_formation.cli.sweep import with_progress
+from robot_formation.errors import FormationError
 
 LINES = (
     ("good: u, v, heading within 1.5 cm, 1 cm, 6 deg, untouched, at most 14 moves", lambda s: f"{s['good']:.1%}"),

@@ -26,8 +26,8 @@ from robot_formation.bag.definitions import definition
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.writer import BagWriter
-from robot_formation.experiment.domain import DomainReservation
 from robot_formation.launching.environment import node_environment
+from robot_formation.network.ros_domain import DomainReservation
 
 TICK, IMAGE = "std_msgs/msg/UInt32", "sensor_msgs/msg/Image"
 PUBLISHER = """

@@ -22,10 +22,10 @@ import cv2
 import numpy as np
 
 from robot_formation.parameters import from_mapping
-from robot_formation.vision.color_table import ColorTable
-from robot_formation.vision.detector import BlockDetector
-from robot_formation.vision.parameters import DetectorParameters
-from robot_formation.vision.signatures import Signature
+from robot_formation.vision.pixy2.color_table import ColorTable
+from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.parameters import DetectorParameters
+from robot_formation.vision.pixy2.signatures import Signature
 
 DATA = Path(__file__).parent.parent / "test" / "data" / "pixy2"
 SCENES = {

@@ -14,9 +14,9 @@ import sys
 
 import numpy as np
 
-from robot_formation.vision.detector import BlockDetector
-from robot_formation.vision.parameters import DetectorParameters
-from robot_formation.vision.signatures import teach_region
+from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.parameters import DetectorParameters
+from robot_formation.vision.pixy2.signatures import teach_region
 
 RED, GREY = np.array((200.0, 40.0, 40.0)), np.array((112.0, 112.0, 112.0))
 SIGMA = 3.0

@@ -13,7 +13,7 @@ import sys
 
 import numpy as np
 
-from robot_formation.control.drive import CalibrationParameters, DriveParameters
+from robot_formation.drive.movement_system import CalibrationParameters, DriveParameters
 from robot_formation.parameters import from_mapping, specs
 from robot_formation.surface import make_surface
 from robot_formation.world import RobotStart, World, WorldParameters

@@ -15,8 +15,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import UInt32
 
-from robot_formation.experiment.domain import DomainReservation
-from robot_formation.nodes.executor import make_executor
+from robot_formation.network.ros_domain import DomainReservation
+from robot_formation.nodes.host.executor import make_executor
 
 
 def microseconds_per_callback(make, domain, messages):

@@ -259,10 +259,10 @@ def base_bags():
     import tempfile
 
     from rosbags.rosbag2 import StoragePlugin, Writer
-    from synthetic_bag import STORE, Step, SyntheticRun
 
     from robot_formation.bag.reader import read_bag
     from robot_formation.bag.writer import BagWriter
+    from synthetic_bag import STORE, Step, SyntheticRun
 
     made = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -335,9 +335,8 @@ DETAILS = ("parameters", "versions", "seed", "timesteps", "formation_distance_m"
 
 def run_details(rng, folder):
     """A whole bag whose metadata says other things of the run than a run does."""
-    from synthetic_bag import Step, SyntheticRun
-
     from robot_formation.bag.writer import BagWriter
+    from synthetic_bag import Step, SyntheticRun
 
     groups = {"world": {"robots": ["leader", "follower_1"], "marker.top_m": 0.216}, "fine_tuner": {"mode": "paper"}}
     odd = (None, 5, -1, 1e300, True, "x", "\ud800", [], [[]], {}, {"a": {}}, *NASTY)

@@ -29,10 +29,10 @@ from robot_formation import conversions
 from robot_formation.components.base import Place
 from robot_formation.components.block_detector import BlockDetectorComponent, BlockDetectorNodeParameters
 from robot_formation.errors import FormationError
-from robot_formation.vision.detector import BlockDetector
-from robot_formation.vision.files import read_parameters, read_picture
-from robot_formation.vision.parameters import DetectorParameters
-from robot_formation.vision.signatures import load_signatures, teach_point, teach_region
+from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.parameters import DetectorParameters
+from robot_formation.vision.pixy2.picture_files import read_parameters, read_picture
+from robot_formation.vision.pixy2.signatures import load_signatures, teach_point, teach_region
 
 DATA = Path(__file__).parent.parent / "test" / "data" / "pixy2"
 EXAMPLES = json.loads((DATA / "examples.json").read_text(encoding="utf-8"))

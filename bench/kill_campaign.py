@@ -28,6 +28,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -135,10 +136,10 @@ class Command:
             self.pids.add(pid)
             with contextlib.suppress(OSError):
                 command = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
-                kind = next((part for part in command if part.startswith("robot_formation.nodes.")), None)
+                kind = next((name for part, name in pairwise(command) if part == "robot_formation.nodes"), None)
                 space = next((part for part in command if part.startswith("__ns:=")), "__ns:=/")
                 if kind is not None:
-                    found[f"{space.removeprefix('__ns:=').rstrip('/')}/{kind.rpartition('.')[2]}"] = pid
+                    found[f"{space.removeprefix('__ns:=').rstrip('/')}/{kind}"] = pid
         return found
 
     def note_shared_memory(self) -> None:

@@ -16,19 +16,19 @@ import cv2
 import numpy as np
 from joblib import Parallel, delayed
 
+from bench.alignment_grid import equipment
 from robot_formation import names
-from robot_formation.control.alignment import FRONT, REAR, TARGET
-from robot_formation.control.marker_view import (
+from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
+from robot_formation.alignment.precise.marker_edges import (
     PICTURE_WIDTH_PX,
     Edge,
     EdgeParameters,
     mean_boxes,
     one_marker,
 )
-from robot_formation.control.relative_pose import GeometryParameters, MarkerModel
-from robot_formation.experiment.alignment_grid import equipment
-from robot_formation.experiment.alignment_trial import FOLLOWER, Start, poses
-from robot_formation.vision.detector import BlockDetector
+from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
+from robot_formation.calibration.alignment_trial import FOLLOWER, Start, poses
+from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world import WorldError
 from robot_formation.world.events import Frame
 from robot_formation.world.world import World

@@ -12,10 +12,10 @@ import sys
 
 import numpy as np
 
-from robot_formation.control.calibration import calibrated
-from robot_formation.control.drive import CalibrationParameters, Drive, DriveParameters
-from robot_formation.experiment.calibration_motors import calibrate_robot
-from robot_formation.experiment.calibration_rig import CalibrationRig, RobotOnRig
+from robot_formation.calibration.motor_moves import calibrate_robot
+from robot_formation.calibration.rig import CalibrationRig, RobotOnRig
+from robot_formation.drive.curves import calibrated
+from robot_formation.drive.movement_system import CalibrationParameters, Drive, DriveParameters
 from robot_formation.experiment.scenario import node_defaults
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping

@@ -15,7 +15,7 @@ from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
 from robot_formation.surface import make_surface
-from robot_formation.vision.overhead_tracking import CALIBRATIONS
+from robot_formation.vision.overhead.dot_tracking import CALIBRATIONS
 from robot_formation.world import WorldParameters, pose_on_surface
 from robot_formation.world.overhead import OverheadCamera
 

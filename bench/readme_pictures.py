@@ -25,10 +25,10 @@ from robot_formation.launching.processes import run_metadata
 from robot_formation.parameters import from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
-from robot_formation.vision.detector import BlockDetector
-from robot_formation.vision.parameters import DetectorParameters
-from robot_formation.vision.signatures import load_signatures
-from robot_formation.vision.tags import TagDetector
+from robot_formation.vision.aruco_detector import TagDetector
+from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.parameters import DetectorParameters
+from robot_formation.vision.pixy2.signatures import load_signatures
 from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
 
 PICTURES = Path(__file__).parent.parent / "docs" / "pictures"

@@ -26,19 +26,19 @@ import time
 import numpy as np
 from joblib import Parallel, delayed
 
+from robot_formation.alignment.paper_rules import TARGET
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.sweep_summary import median_with_interval
 from robot_formation.cli.sweep import seeds
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
-from robot_formation.control.alignment import TARGET
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.sweep import CONDITIONS
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
-from robot_formation.tags import Face
-from robot_formation.vision.detector import BlockDetector
-from robot_formation.vision.tags import TagDetector
+from robot_formation.vision.aruco_detector import TagDetector
+from robot_formation.vision.aruco_patterns import Face
+from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
 from robot_formation.world.tag_faces import FACES
 

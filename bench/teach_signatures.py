@@ -13,7 +13,7 @@ from robot_formation.components.world import WorldNodeParameters
 from robot_formation.experiment.scenario import node_defaults
 from robot_formation.parameters import from_mapping
 from robot_formation.paths import config_dir
-from robot_formation.vision.signatures import save_signatures, teach_region
+from robot_formation.vision.pixy2.signatures import save_signatures, teach_region
 from robot_formation.world import marker_picture
 
 FACES = ("target", "front", "rear")

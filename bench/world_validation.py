@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from robot_formation.control.drive import Drive, DriveParameters
+from robot_formation.drive.movement_system import Drive, DriveParameters
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import SURFACES, make_surface

@@ -18,10 +18,10 @@ from typing import Any
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment.scenario import node_defaults
-from robot_formation.nodes.following import Executable, ProgressParameters
-from robot_formation.nodes.parameters import AT_START, HostParameters, reasons
-from robot_formation.nodes.playing import PlayerNode, PlayerParameters
-from robot_formation.nodes.recording import RecorderNode, RecorderParameters
+from robot_formation.nodes.host.ros_parameters import AT_START, HostParameters, reasons
+from robot_formation.nodes.player.player_node import PlayerNode, PlayerParameters
+from robot_formation.nodes.progress.progress_node import Executable, ProgressParameters
+from robot_formation.nodes.recorder.recorder_node import RecorderNode, RecorderParameters
 from robot_formation.parameters import Spec, specs
 
 PAGES = Path(__file__).parent / "nodes"

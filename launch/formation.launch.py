@@ -17,7 +17,7 @@ from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
 from robot_formation import names
-from robot_formation.bag.place import check_free
+from robot_formation.bag.bag_path import check_free
 from robot_formation.errors import FormationError
 from robot_formation.launching.arguments import (
     ARGUMENTS,

@@ -8,7 +8,7 @@ import os
 import pytest
 from hypothesis import settings
 
-from robot_formation.loopback import PROFILES
+from robot_formation.network.loopback import PROFILES
 from robot_formation.paths import config_dir
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)

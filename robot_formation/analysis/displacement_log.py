@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.errors import shown
-from robot_formation.files import read_file
 from robot_formation.parameters import suggestion
+from robot_formation.system.files import read_file
 
 DISPLACEMENT, RESIDUAL, COMMANDED = ((f"{prefix}u_m", f"{prefix}v_m") for prefix in ("", "residual_", "commanded_"))
 _PAIRS = (DISPLACEMENT, RESIDUAL, COMMANDED)

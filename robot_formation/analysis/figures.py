@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.analysis.drawing import legend_below, new_figure, save_figure
+from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
 from robot_formation.analysis.quantities import Corrections, FollowerAnalysis, RunAnalysis
-from robot_formation.analysis.record import Ground, RunRecord, Track
-from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
+from robot_formation.analysis.run_record import Ground, RunRecord, Track
+from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.names import LEADER
 
 # Okabe and Ito's palette, safe for colour-blind readers; leader orange and follower blue as in the paper's figures.

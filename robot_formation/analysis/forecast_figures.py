@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.analysis.displacement_log import DisplacementLog
-from robot_formation.analysis.drawing import legend_below, new_figure, save_figure
 from robot_formation.analysis.forecasts import OneStepForecasts
+from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
 
 # Okabe and Ito's palette, safe for colour-blind readers.
 _COLOURS = ("#0072B2", "#E69F00", "#009E73")

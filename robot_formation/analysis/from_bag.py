@@ -15,10 +15,10 @@ import numpy as np
 from robot_formation import names
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
-from robot_formation.analysis.record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
+from robot_formation.analysis.run_record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
 from robot_formation.bag.formation_bag import FormationBag
+from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.reader import read_bag
-from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.geometry.orientation import yaw_rad
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import suggestion

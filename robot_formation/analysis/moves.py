@@ -20,8 +20,8 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
 
-from robot_formation.analysis.record import FollowerRecord
-from robot_formation.control.alignment_state import AlignmentState
+from robot_formation.analysis.run_record import FollowerRecord
+from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
 
 AXES = ("u", "v", "turn")

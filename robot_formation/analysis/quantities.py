@@ -34,8 +34,8 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.moves import Moves, move_totals, movements_of, moves_of
-from robot_formation.analysis.record import FollowerRecord, RunRecord
-from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
+from robot_formation.analysis.run_record import FollowerRecord, RunRecord
+from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.names import beacon_neighbour
 

@@ -12,9 +12,9 @@ from robot_formation.analysis.conditions import conditions_text, run_facts
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.figures import draw_corrections, draw_trajectory
 from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, Timestep
-from robot_formation.analysis.record import RunRecord
+from robot_formation.analysis.run_record import RunRecord
 from robot_formation.bag.folder import bag_name
-from robot_formation.control.fine_tuner import COLLECTION_TIMESTEPS
+from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion
 
 _HEADERS = (

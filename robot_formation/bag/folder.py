@@ -15,15 +15,15 @@ from typing import Any
 
 import zstandard
 
+from robot_formation.bag.bag_path import PARTIAL_SUFFIX
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.mcap_records import MAGIC
 from robot_formation.bag.mcap_source import has_index
-from robot_formation.bag.place import PARTIAL_SUFFIX
-from robot_formation.bag.records import MAGIC
 from robot_formation.bag.recover import in_order, mcap_files, recover
 from robot_formation.errors import shown
-from robot_formation.files import check_file, open_file, size_text
-from robot_formation.temporary_folder import BAG, temporary_folder
-from robot_formation.yaml_files import read_yaml
+from robot_formation.system.files import check_file, open_file, size_text
+from robot_formation.system.temporary_folder import BAG, temporary_folder
+from robot_formation.system.yaml_files import read_yaml
 
 METADATA_FILE = "metadata.yaml"
 _STORAGES = (".mcap", ".db3")

@@ -9,11 +9,11 @@ from typing import Any
 
 from robot_formation.bag.folder import storage_files
 from robot_formation.bag.formation_bag import formation_namespaces
+from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.reader import read_bag
-from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.bag.run_details import value
-from robot_formation.files import size_text
+from robot_formation.system.files import size_text
 
 _DETAILS = ("scenario", "seed", "predictor", "surface", "git_commit", "dropped", "lost")
 _EARLIEST_DATE_NS = 10**18  # September 2001: no clock of a ROS robot that was set has shown an earlier date

@@ -22,14 +22,14 @@ from mcap.records import (
     Statistics,
 )
 
-from robot_formation.bag.chunks import chunk_messages
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.mcap_chunks import chunk_messages
+from robot_formation.bag.mcap_records import MAGIC, records, summary_place
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.qos import TopicQos, parse_profiles
-from robot_formation.bag.records import MAGIC, records, summary_place
 from robot_formation.bag.source import RawMessage, Source
 from robot_formation.errors import shown
-from robot_formation.files import open_file
+from robot_formation.system.files import open_file
 
 _FOREVER_NS = 2**64
 

@@ -10,7 +10,7 @@ import yaml
 
 from robot_formation.bag.errors import BagError
 from robot_formation.errors import shown
-from robot_formation.yaml_files import YamlError, parse_yaml
+from robot_formation.system.yaml_files import YamlError, parse_yaml
 
 INFINITE_NS = 2**63 - 1
 """RMW_DURATION_INFINITE in nanoseconds: what a publisher without deadline, lifespan or lease reports."""

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-from robot_formation.bag.chunks import unpacked_message
 from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.folder import FolderMetadata, readable, storage_of
+from robot_formation.bag.mcap_chunks import unpacked_message
 from robot_formation.bag.mcap_source import McapSource
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.source import RawMessage, Source

@@ -9,7 +9,7 @@ from functools import partial
 from queue import SimpleQueue
 
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.recorder import Recorder
+from robot_formation.bag.message_recorder import Recorder
 
 QUEUE_BYTES = 1 << 26
 

@@ -13,15 +13,15 @@ from typing import Any
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, DataEnd, Header, Message, Metadata, Schema
 
-from robot_formation.bag.chunks import chunk_records
 from robot_formation.bag.definitions import Definition
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.mcap_chunks import chunk_records
+from robot_formation.bag.mcap_records import MAGIC, records
 from robot_formation.bag.metadata import Span
 from robot_formation.bag.qos import TopicQos, parse_profiles
-from robot_formation.bag.records import MAGIC, records
 from robot_formation.bag.writer import BagWriter
 from robot_formation.errors import shown
-from robot_formation.files import open_file
+from robot_formation.system.files import open_file
 
 RECOVERING_SUFFIX = ".recovering"
 """What the new bag's folder is called behind its name while the old one is being copied into it."""

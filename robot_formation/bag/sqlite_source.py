@@ -14,7 +14,7 @@ from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.source import RawMessage, Source
 from robot_formation.errors import shown
-from robot_formation.files import check_file
+from robot_formation.system.files import check_file
 
 _ENCODINGS = {MessageDefinitionFormat.MSG: "ros2msg", MessageDefinitionFormat.IDL: "ros2idl"}
 

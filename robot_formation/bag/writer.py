@@ -10,11 +10,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from robot_formation.bag.bag_path import PARTIAL_SUFFIX, check_free, recover_hint
 from robot_formation.bag.definitions import Definition, definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.mcap_file import CHUNK_BYTES, COMPRESSIONS, McapFile
 from robot_formation.bag.metadata import bag_information, merged, to_yaml
-from robot_formation.bag.place import PARTIAL_SUFFIX, check_free, recover_hint
 from robot_formation.bag.qos import TopicQos
 
 _LAST_STAMP_NS = 2**63 - 1

@@ -18,7 +18,7 @@ from robot_formation.cli.parser import whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.experiment.calibration_rig import CalibrationRig
+    from robot_formation.calibration.rig import CalibrationRig
     from robot_formation.experiment.scenario import Scenario
 
 DESCRIPTION = "Measure the robots of a scenario, each alone in the middle of the plate, or the follower's camera."
@@ -98,12 +98,12 @@ def run_motors(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments, on files in the way, or if a curve can't be fitted.
     """
-    from robot_formation.analysis.calibration_figures import draw_motors
-    from robot_formation.analysis.calibration_report import motors_json, motors_text
-    from robot_formation.control.calibration import MotorCalibration, save_calibration
-    from robot_formation.control.drive import DriveParameters
-    from robot_formation.experiment.calibration_motors import calibrate_motors, curves
-    from robot_formation.experiment.drive_check import robot_facts
+    from robot_formation.calibration.drive_check import robot_facts
+    from robot_formation.calibration.motor_figures import draw_motors
+    from robot_formation.calibration.motor_moves import calibrate_motors, curves
+    from robot_formation.calibration.motor_report import motors_json, motors_text
+    from robot_formation.drive.curves import MotorCalibration, save_calibration
+    from robot_formation.drive.movement_system import DriveParameters
     from robot_formation.parameters import from_mapping
 
     scenario = build_scenario(args, with_curves=False)
@@ -131,12 +131,12 @@ def run_encoders(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments, on files in the way, or if a drive can't be measured.
     """
-    from robot_formation.analysis.calibration_figures import draw_encoders
-    from robot_formation.analysis.calibration_report import encoders_json, encoders_text
-    from robot_formation.control.distance_comparison import compare_distances
-    from robot_formation.control.drive import DriveParameters
-    from robot_formation.experiment.calibration_encoders import measure_encoders
-    from robot_formation.experiment.drive_check import describe_curves
+    from robot_formation.calibration.drive_check import describe_curves
+    from robot_formation.calibration.encoder_comparison import compare_distances
+    from robot_formation.calibration.encoder_moves import measure_encoders
+    from robot_formation.calibration.motor_figures import draw_encoders
+    from robot_formation.calibration.motor_report import encoders_json, encoders_text
+    from robot_formation.drive.movement_system import DriveParameters
     from robot_formation.parameters import from_mapping, suggestion
 
     scenario = build_scenario(args, with_curves=True)
@@ -160,8 +160,8 @@ def run_encoders(args: argparse.Namespace) -> int:
 
 def make_rig(args: argparse.Namespace, scenario: Scenario) -> CalibrationRig:
     """Make the calibration rig of the scenario's ground and robots."""
+    from robot_formation.calibration.rig import CalibrationRig
     from robot_formation.components.catalogue import KINDS
-    from robot_formation.experiment.calibration_rig import CalibrationRig
     from robot_formation.parameters import from_mapping
 
     world = from_mapping(KINDS["world"].parameter_class(), scenario.parameters("world"), where="world")

@@ -17,10 +17,10 @@ from robot_formation.cli.sweep import with_progress
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.analysis.vision_report import VisionResult
-    from robot_formation.control.camera_samples import CameraSample
+    from robot_formation.calibration.camera_grid import Conditions, Position
+    from robot_formation.calibration.camera_report import VisionResult
+    from robot_formation.calibration.camera_samples import CameraSample
     from robot_formation.experiment.scenario import Scenario
-    from robot_formation.experiment.vision_grid import Conditions, Position
 
 DESCRIPTION = """\
 Place the follower's camera at every 5 cm of -45 to 45 cm along u and v around its beacon neighbour and at nine relative
@@ -50,9 +50,9 @@ def run_vision(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments or the folder, or if the curves can't be fitted.
     """
-    from robot_formation.experiment.calibration_vision import BAG_NAME, conditions_of, record_of
-    from robot_formation.experiment.vision_grid import positions
-    from robot_formation.experiment.vision_table import RECORD_NAME, TABLE_NAME, VisionTable
+    from robot_formation.calibration.camera_grid import positions
+    from robot_formation.calibration.camera_run import BAG_NAME, conditions_of, record_of
+    from robot_formation.calibration.camera_table import RECORD_NAME, TABLE_NAME, VisionTable
 
     if args.jobs < 1:
         raise FormationError(f"--jobs is at least 1, not {args.jobs}")
@@ -74,7 +74,7 @@ def run_vision(args: argparse.Namespace) -> int:
 
 
 def _look(table: Any, places: list[Position], conditions: Conditions, jobs: int) -> None:
-    from robot_formation.experiment.calibration_vision import carry_out
+    from robot_formation.calibration.camera_run import carry_out
 
     todo = table.remaining(places)
     if not todo:
@@ -91,16 +91,16 @@ def _evaluate(
     scenario: Scenario, conditions: Conditions, samples: list[CameraSample], folder: Path, step_m: float
 ) -> VisionResult:
     """Write bag, pictures and calibration; the curves come last because they may not be found."""
-    from robot_formation.analysis.vision_areas_figure import draw_areas
-    from robot_formation.analysis.vision_curve_figures import draw_pan, draw_side
-    from robot_formation.analysis.vision_report import VisionResult
-    from robot_formation.bag.place import PARTIAL_SUFFIX
-    from robot_formation.control.edge_bias import edge_biases
-    from robot_formation.control.vision_calibration import VisionCalibration, save_vision
-    from robot_formation.control.vision_fit import face_views, fit_camera
-    from robot_formation.experiment.calibration_vision import BAG_NAME, record_of, write_bag
-    from robot_formation.experiment.camera_check import camera_facts
-    from robot_formation.experiment.vision_grid import true_faces
+    from robot_formation.bag.bag_path import PARTIAL_SUFFIX
+    from robot_formation.calibration.camera_areas_figure import draw_areas
+    from robot_formation.calibration.camera_check import camera_facts
+    from robot_formation.calibration.camera_curve_figures import draw_pan, draw_side
+    from robot_formation.calibration.camera_edge_bias import edge_biases
+    from robot_formation.calibration.camera_fit import face_views, fit_camera
+    from robot_formation.calibration.camera_grid import true_faces
+    from robot_formation.calibration.camera_report import VisionResult
+    from robot_formation.calibration.camera_run import BAG_NAME, record_of, write_bag
+    from robot_formation.follower.camera_calibration_file import VisionCalibration, save_vision
 
     bag = folder / BAG_NAME
     if not bag.exists():
@@ -124,9 +124,9 @@ def _evaluate(
 
 
 def _print(args: argparse.Namespace, scenario: Scenario, result: VisionResult, folder: Path) -> None:
-    from robot_formation.analysis.vision_report import vision_json, vision_text
-    from robot_formation.experiment.calibration_vision import BAG_NAME
-    from robot_formation.experiment.vision_table import TABLE_NAME
+    from robot_formation.calibration.camera_report import vision_json, vision_text
+    from robot_formation.calibration.camera_run import BAG_NAME
+    from robot_formation.calibration.camera_table import TABLE_NAME
 
     files = {"table": folder / TABLE_NAME, "bag": folder / BAG_NAME, "file": folder / CALIBRATION_FILE}
     pictures = {name: str(folder / picture) for name, picture in PICTURES.items()}

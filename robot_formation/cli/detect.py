@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.vision.block import Block
-    from robot_formation.vision.parameters import DetectorParameters
-    from robot_formation.vision.picture import Picture
-    from robot_formation.vision.tags import BlockSensor
+    from robot_formation.vision.aruco_detector import BlockSensor
+    from robot_formation.vision.pixy2.block import Block
+    from robot_formation.vision.pixy2.parameters import DetectorParameters
+    from robot_formation.vision.pixy2.picture import Picture
 
 DESCRIPTION = """\
 Find the blocks of taught colours in images, as a Pixy2 does, or, with --sensor tags, the faces of a marker of tags.
@@ -65,8 +65,8 @@ def run(args: argparse.Namespace) -> int:
     import dataclasses
     import json
 
-    from robot_formation.vision.files import check_readable, read_parameters, read_picture
-    from robot_formation.vision.parameters import DetectorParameters
+    from robot_formation.vision.pixy2.parameters import DetectorParameters
+    from robot_formation.vision.pixy2.picture_files import check_readable, read_parameters, read_picture
 
     for path in args.images:
         check_readable(path)
@@ -90,9 +90,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _detector(sensor: str, signatures: Path | None, parameters: DetectorParameters) -> BlockSensor:
-    from robot_formation.vision.detector import BlockDetector
-    from robot_formation.vision.signatures import load_signatures
-    from robot_formation.vision.tags import TagDetector
+    from robot_formation.vision.aruco_detector import TagDetector
+    from robot_formation.vision.pixy2.detector import BlockDetector
+    from robot_formation.vision.pixy2.signatures import load_signatures
 
     if sensor == "tags":
         return TagDetector(tracking=parameters)
@@ -118,8 +118,8 @@ def _sequence(detector: BlockSensor, pictures: Iterable[tuple[Path, Picture]], d
 
 
 def _draw(folder: Path, number: int, path: Path, picture: Picture, blocks: list[Block]) -> None:
-    from robot_formation.vision.drawing import write_drawn
-    from robot_formation.vision.picture import PictureError
+    from robot_formation.vision.pixy2.block_drawing import write_drawn
+    from robot_formation.vision.pixy2.picture import PictureError
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -138,10 +138,10 @@ def _check_mask(args: argparse.Namespace) -> None:
 
 
 def _mask(args: argparse.Namespace, parameters: DetectorParameters, picture: Picture) -> None:
-    from robot_formation.vision.color_table import ColorTable
-    from robot_formation.vision.drawing import write_mask
-    from robot_formation.vision.matches import matching_signatures
-    from robot_formation.vision.signatures import load_signatures
+    from robot_formation.vision.pixy2.block_drawing import write_mask
+    from robot_formation.vision.pixy2.color_table import ColorTable
+    from robot_formation.vision.pixy2.matches import matching_signatures
+    from robot_formation.vision.pixy2.signatures import load_signatures
 
     table = ColorTable.of(load_signatures(args.signatures), parameters)
     write_mask(args.mask, picture, matching_signatures(picture, table))

@@ -16,7 +16,7 @@ from typing import Any
 
 import robot_formation
 from robot_formation import paths
-from robot_formation.shared_memory_space import SHARED_MEMORY, SharedMemoryError, require_space
+from robot_formation.network.shared_memory_space import SHARED_MEMORY, SharedMemoryError, require_space
 
 # Module to import, and the distributions (of pip) that may bring it.
 _MODULES = {
@@ -154,7 +154,7 @@ def _modules(missing: list[str]) -> dict[str, Any]:
 
 
 def _domain(missing: list[str]) -> dict[str, Any]:
-    from robot_formation.experiment.domain import DomainError, free_domain
+    from robot_formation.network.ros_domain import DomainError, free_domain
 
     try:
         return {"next_free": free_domain()}
@@ -164,7 +164,7 @@ def _domain(missing: list[str]) -> dict[str, Any]:
 
 
 def _shared_memory(missing: list[str]) -> dict[str, Any]:
-    from robot_formation.experiment.shared_memory import fast_dds_files, find_orphans
+    from robot_formation.network.shared_memory import fast_dds_files, find_orphans
 
     try:
         state = os.statvfs(SHARED_MEMORY)

@@ -14,7 +14,7 @@ import sys
 import time
 from typing import Any
 
-from robot_formation import signal_handling
+from robot_formation.system import signal_handling
 
 _INTERRUPTED = 130
 _IMPATIENT_S = 2.0

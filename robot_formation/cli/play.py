@@ -13,7 +13,7 @@ from robot_formation.cli.parser import number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.nodes.playing import PlayerParameters, PlayReport
+    from robot_formation.nodes.player.player_node import PlayerParameters, PlayReport
 
 DESCRIPTION = """\
 Publish the messages of a bag (ours, or one of 'ros2 bag', MCAP or SQLite) when they are due, with the quality of
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         raise FormationError(f"--rate is {args.rate:g}, but must be above 0: 2 plays twice as fast, 0.5 at half speed")
     from robot_formation.bag.reader import read_bag
     from robot_formation.bag.selection import Selection
-    from robot_formation.shared_memory_space import require_space
+    from robot_formation.network.shared_memory_space import require_space
 
     require_space()  # before ROS is loaded
     selection = Selection(args.topics, args.regex, args.exclude)
@@ -71,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
         if bag.recovered:
             _say(f"{args.bag} was not closed: what can be saved of it is played")
         selection.check(bag.topics, args.bag)
-        from robot_formation.nodes.playing import PlayerNode
-        from robot_formation.nodes.session import Interrupts, node_session
+        from robot_formation.nodes.host.session import Interrupts, node_session
+        from robot_formation.nodes.player.player_node import PlayerNode
 
         parameters = _parameters(args)
         with Interrupts() as interrupts, node_session("player") as node:
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _parameters(args: argparse.Namespace) -> PlayerParameters:
-    from robot_formation.nodes.playing import PlayerParameters
+    from robot_formation.nodes.player.player_node import PlayerParameters
     from robot_formation.parameters import from_mapping
 
     values = {

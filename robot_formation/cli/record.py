@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.bag.place import PathReservation
-    from robot_formation.nodes.recording import RecorderParameters, RecordReport
+    from robot_formation.bag.bag_path import PathReservation
+    from robot_formation.nodes.recorder.recorder_node import RecorderParameters, RecordReport
 
 DESCRIPTION = """\
 Record topics of the ROS graph (ROS_DOMAIN_ID and the like count) into an MCAP bag until Ctrl-C. Topics that appear
@@ -65,9 +65,9 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.all == bool(args.topics or args.regex):
         raise FormationError("say what to record: topics, --regex, or --all alone")
-    from robot_formation.bag.place import PathReservation, check_free
+    from robot_formation.bag.bag_path import PathReservation, check_free
     from robot_formation.bag.selection import Selection
-    from robot_formation.shared_memory_space import require_space
+    from robot_formation.network.shared_memory_space import require_space
 
     require_space()  # before ROS is loaded
     Selection(args.topics, args.regex, args.exclude or "")  # a bad expression is told before ROS is loaded
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
 
 def default_bag() -> PathReservation:
     """Name a new bag after the time, and reserve the name."""
-    from robot_formation.bag.place import reserve_new
+    from robot_formation.bag.bag_path import reserve_new
     from robot_formation.paths import default_bags_dir
 
     return reserve_new(default_bags_dir(), time.strftime("recording_%Y%m%d-%H%M%S"))
@@ -94,8 +94,8 @@ def default_bag() -> PathReservation:
 
 def _record(args: argparse.Namespace, path: Path) -> RecordReport:
     from robot_formation.bag.provenance import git_commit, versions
-    from robot_formation.nodes.recording import RecorderNode
-    from robot_formation.nodes.session import Interrupts, node_session
+    from robot_formation.nodes.host.session import Interrupts, node_session
+    from robot_formation.nodes.recorder.recorder_node import RecorderNode
 
     texts = {"versions": json.dumps(versions()), "git_commit": git_commit()}
     parameters = _parameters(args, path, tuple(f"{key}={text}" for key, text in texts.items()))
@@ -106,7 +106,7 @@ def _record(args: argparse.Namespace, path: Path) -> RecordReport:
 
 
 def _parameters(args: argparse.Namespace, path: Path, metadata: tuple[str, ...]) -> RecorderParameters:
-    from robot_formation.nodes.recording import RecorderParameters
+    from robot_formation.nodes.recorder.recorder_node import RecorderParameters
     from robot_formation.parameters import from_mapping
 
     values = {

@@ -55,8 +55,8 @@ def run(args: argparse.Namespace) -> int:
 
 def default_out(bag: Path) -> Path:
     """Name the new bag: that of a .partial folder gets the name it was to have."""
+    from robot_formation.bag.bag_path import PARTIAL_SUFFIX
     from robot_formation.bag.folder import bag_name
-    from robot_formation.bag.place import PARTIAL_SUFFIX
 
     bag = bag.resolve()
     name = bag_name(bag)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from robot_formation.errors import FormationError, shown
 
 if TYPE_CHECKING:
-    from robot_formation.experiment.recording import Recording
+    from robot_formation.experiment.recorded_run import Recording
     from robot_formation.experiment.replay import DetectionReplay, PredictionReplay
     from robot_formation.experiment.replay_fine_tuner import Decisions, FineTunerReplay
     from robot_formation.geometry.se2 import Motion
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         FormationError: the bag can't be read or lacks what is needed, or a setting is wrong.
     """
     from robot_formation.bag.reader import read_bag
-    from robot_formation.experiment.recording import Recording
+    from robot_formation.experiment.recorded_run import Recording
 
     kind = "fine_tuner" if args.fine_tuner else "block_detector" if args.detector else "predictor"
     changes = _changes(kind, args.set)
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _changes(kind: str, settings: Sequence[str]) -> dict[str, Any]:
     """Read --set as `formation run` does; settings of other nodes are refused."""
-    from robot_formation.yaml_files import YamlError, parse_yaml
+    from robot_formation.system.yaml_files import YamlError, parse_yaml
 
     found = {}
     for setting in settings:

@@ -15,7 +15,7 @@ from robot_formation.cli.parser import number, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.bag.place import PathReservation
+    from robot_formation.bag.bag_path import PathReservation
     from robot_formation.experiment.run_result import RunResult
     from robot_formation.experiment.scenario import Scenario
 
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments, before anything is started.
     """
-    from robot_formation.experiment.shared_memory import TracingFiles
+    from robot_formation.network.shared_memory import TracingFiles
 
     tracing = TracingFiles()  # before anything of ROS is loaded
     try:
@@ -134,7 +134,7 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
 
 def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
     """Reserve the bag's path: as asked for, else a new name after the run and the time."""
-    from robot_formation.bag.place import PathReservation, reserve_new
+    from robot_formation.bag.bag_path import PathReservation, reserve_new
     from robot_formation.paths import default_bags_dir
 
     if args.bag is not None:
@@ -146,8 +146,8 @@ def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
 
 def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation) -> RunResult:
     """Run the scenario in the way that the options ask for."""
-    from robot_formation.experiment.camera_check import describe_camera
-    from robot_formation.experiment.drive_check import describe_curves
+    from robot_formation.calibration.camera_check import describe_camera
+    from robot_formation.calibration.drive_check import describe_curves
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)

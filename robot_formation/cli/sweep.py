@@ -17,7 +17,7 @@ from robot_formation.cli.parser import Names, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
-    from robot_formation.bag.place import PathReservation
+    from robot_formation.bag.bag_path import PathReservation
     from robot_formation.experiment.sweep import Plan
 
 DESCRIPTION = """\
@@ -191,7 +191,7 @@ def _seeds(text: str) -> range:
 
 def default_folder() -> PathReservation:
     """Name a new folder after the time, and reserve the name."""
-    from robot_formation.bag.place import reserve_new
+    from robot_formation.bag.bag_path import reserve_new
     from robot_formation.paths import default_bags_dir
 
     return reserve_new(default_bags_dir(), f"sweep_{time.strftime('%Y%m%d-%H%M%S')}")

@@ -50,10 +50,10 @@ def run(args: argparse.Namespace) -> int:
     import dataclasses
     import json
 
-    from robot_formation.vision.files import read_parameters, read_picture
-    from robot_formation.vision.parameters import DetectorParameters
-    from robot_formation.vision.signature_quality import shortcomings
-    from robot_formation.vision.signatures import load_signatures, save_signatures, teach_point, teach_region
+    from robot_formation.vision.pixy2.parameters import DetectorParameters
+    from robot_formation.vision.pixy2.picture_files import read_parameters, read_picture
+    from robot_formation.vision.pixy2.signature_quality import shortcomings
+    from robot_formation.vision.pixy2.signatures import load_signatures, save_signatures, teach_point, teach_region
 
     parameters = read_parameters(args.parameters, _warn) if args.parameters else DetectorParameters()
     kept = load_signatures(args.out) if args.out and args.out.exists() else []

@@ -1,6 +1,6 @@
 """A node's body without rclpy: what it listens to, what it sends, what it does.
 
-The node graph hosts a component in an rclpy node (nodes/host.py), the in-process runner on a queue
+The node graph hosts a component in an rclpy node (nodes/host/component_node.py), the in-process runner on a queue
 (experiment/in_process.py). Both hand it the same messages, so both give the same run.
 """
 

@@ -16,13 +16,13 @@ from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.parameters import parameter
 from robot_formation.paths import config_dir
-from robot_formation.vision.block import Block
-from robot_formation.vision.detector import BlockDetector
-from robot_formation.vision.parameters import DetectorParameters
-from robot_formation.vision.picture import HEIGHT, WIDTH, Picture, scaled
-from robot_formation.vision.signatures import Signature, load_signatures
-from robot_formation.vision.tags import BlockSensor, TagDetector, TagParameters
-from robot_formation.vision.tracking import ClockError
+from robot_formation.vision.aruco_detector import BlockSensor, TagDetector, TagParameters
+from robot_formation.vision.pixy2.block import Block
+from robot_formation.vision.pixy2.block_tracking import ClockError
+from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.parameters import DetectorParameters
+from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, Picture, scaled
+from robot_formation.vision.pixy2.signatures import Signature, load_signatures
 
 _RATE_FRAMES = 31
 _WHITE = (255, 255, 255)

@@ -49,10 +49,10 @@ KINDS: dict[str, NodeKind] = {
     for kind in (
         _kind("world", "World", "WorldNodeParameters", ""),
         _kind("overhead_tracker", "OverheadTracker", "OverheadTrackerNodeParameters", ""),
-        _kind("drive", "Drive", "robot_formation.control.drive.DriveParameters", "all"),
+        _kind("drive", "Drive", "robot_formation.drive.movement_system.DriveParameters", "all"),
         _kind("block_detector", "BlockDetector", "BlockDetectorNodeParameters", "followers"),
         _kind("predictor", "Predictor", "robot_formation.koopman.predictors.PredictorParameters", "followers"),
         _kind("fine_tuner", "FineTuner", "FineTunerNodeParameters", "followers"),
-        _kind("leader", "Leader", "robot_formation.control.leader.LeaderParameters", "leader"),
+        _kind("leader", "Leader", "robot_formation.leader.leader_motion.LeaderParameters", "leader"),
     )
 }

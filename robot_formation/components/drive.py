@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
-from robot_formation.control.calibration import calibrated
-from robot_formation.control.drive import Drive, DriveAction, DriveParameters
+from robot_formation.drive.curves import calibrated
+from robot_formation.drive.movement_system import Drive, DriveAction, DriveParameters
 from robot_formation.parameters import ParameterError
 
 # Encoder wheels: half a pulse of 0.233 mm and 0.3 % of 5 cm, rounded up, as one standard deviation each way.

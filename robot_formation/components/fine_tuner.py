@@ -8,9 +8,9 @@ from typing import Any
 
 from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
-from robot_formation.control import fine_tuner as core
-from robot_formation.control.alignment_state import State
-from robot_formation.control.vision_calibration import calibrated
+from robot_formation.follower import fine_tuning as core
+from robot_formation.follower.alignment_state import State
+from robot_formation.follower.camera_calibration_file import calibrated
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 

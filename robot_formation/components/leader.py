@@ -8,7 +8,7 @@ from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
-from robot_formation.control.leader import Leader, LeaderAction, LeaderParameters
+from robot_formation.leader.leader_motion import Leader, LeaderAction, LeaderParameters
 
 
 class LeaderComponent(Component):

@@ -11,7 +11,7 @@ from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.trail import Trail
 from robot_formation.parameters import ParameterError, parameter
 from robot_formation.surface import SURFACES, Surface, surface_from_texts
-from robot_formation.vision.overhead_tracking import OverheadTracker, OverheadTrackingParameters
+from robot_formation.vision.overhead.dot_tracking import OverheadTracker, OverheadTrackingParameters
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import numpy as np
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
-from robot_formation.files import MOST_RECORD_BYTES, read_file
 from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
+from robot_formation.system.files import MOST_RECORD_BYTES, read_file
 
 _MOST_UNPAIRED = 16  # timesteps of which not all parts have come: in a run, one at a time
 # (u, v) to (x, y) = (v, -u): how a covariance of the paper's axes becomes one of REP-103.

@@ -5,7 +5,7 @@ Readers check what comes from outside and raise `MessageError` before anything r
 
 from __future__ import annotations
 
-from robot_formation.shared_memory_space import require_space
+from robot_formation.network.shared_memory_space import require_space
 
 require_space()  # before the imports below load ROS
 

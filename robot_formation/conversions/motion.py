@@ -10,8 +10,8 @@ from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceSt
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import JointState
 
-from robot_formation.control.drive import JOINTS, WHEELS, WheelCommand
 from robot_formation.conversions.basics import MessageError, header
+from robot_formation.drive.movement_system import JOINTS, WHEELS, WheelCommand
 from robot_formation.geometry.se2 import Motion
 
 _LARGEST_WHEEL_ANGLE_RAD = 1e4

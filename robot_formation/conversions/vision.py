@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 
 from robot_formation.conversions.basics import MessageError, header
-from robot_formation.vision.block import Block
+from robot_formation.vision.pixy2.block import Block
 
 # One point per block. x, y, width and height are pixels, angle degrees, index and age counts (Pixy2 getBlocks record).
 BLOCK_DTYPE = np.dtype(

@@ -1,1 +1,1 @@
-"""Scenarios, in-process runs, and what a run on this machine needs."""
+"""Scenarios, runs in one process, sweeps, and replays of recorded runs."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from robot_formation import exit_codes, names
 from robot_formation.analysis.from_bag import record_of, run_topics
-from robot_formation.analysis.record import RunRecord
+from robot_formation.analysis.run_record import RunRecord
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from robot_formation import conversions, exit_codes
-from robot_formation.bag.place import PathReservation, check_free
+from robot_formation.bag.bag_path import PathReservation, check_free
+from robot_formation.bag.message_recorder import Recorder
 from robot_formation.bag.qos import TopicQos
-from robot_formation.bag.recorder import Recorder
 from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import NodeKind
 from robot_formation.experiment.progress import Progress

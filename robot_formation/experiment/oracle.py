@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from robot_formation import conversions, names
+from robot_formation.alignment.paper_rules import AlignmentParameters
 from robot_formation.components.fine_tuner import FineTunerNodeParameters
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters
-from robot_formation.control.alignment import AlignmentParameters
-from robot_formation.control.alignment_state import AlignmentState
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.world.camera import Camera

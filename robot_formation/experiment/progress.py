@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.control.alignment_state import AlignmentState
+from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 
 _SAME = 1e-6  # metres and radians

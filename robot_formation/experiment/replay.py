@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.experiment.recording import Recording, equal, handlers, host
+from robot_formation.experiment.recorded_run import Recording, equal, handlers, host
 from robot_formation.geometry.se2 import Motion
-from robot_formation.vision.block import Block
+from robot_formation.vision.pixy2.block import Block
 
 
 @dataclass(frozen=True)

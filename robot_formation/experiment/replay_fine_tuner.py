@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from robot_formation import conversions, names
-from robot_formation.control.alignment_state import AlignmentState
-from robot_formation.experiment.recording import Recording, equal, handlers, host
+from robot_formation.experiment.recorded_run import Recording, equal, handlers, host
+from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
 
 _SENT = (names.ALIGNMENT, names.MOVE, names.DISPLACEMENT, names.RESIDUAL)

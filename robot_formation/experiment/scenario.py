@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from robot_formation import names
+from robot_formation.calibration.camera_check import check_camera
+from robot_formation.calibration.drive_check import check_curves
 from robot_formation.components.catalogue import KINDS, NodeKind
 from robot_formation.errors import FormationError, shown
-from robot_formation.experiment.camera_check import check_camera
-from robot_formation.experiment.drive_check import check_curves
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.parameters import (
     ParameterError,
@@ -27,7 +27,7 @@ from robot_formation.parameters import (
 )
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
-from robot_formation.yaml_files import YamlError, parse_yaml, read_yaml
+from robot_formation.system.yaml_files import YamlError, parse_yaml, read_yaml
 
 # Parameters that follow from the setup, and what to set instead.
 _FIXED = {

@@ -18,16 +18,16 @@ from typing import Any, NamedTuple
 
 from robot_formation.analysis.conditions import conditions
 from robot_formation.analysis.quantities import analyse
+from robot_formation.batch.pool import run_parallel
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.oracle import IDEAL, IdealRun
-from robot_formation.experiment.pool import run_parallel
-from robot_formation.files import MOST_RECORD_BYTES, read_file, whole_lines
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.parameters import suggestion
 from robot_formation.surface import SURFACES
+from robot_formation.system.files import MOST_RECORD_BYTES, read_file, whole_lines
 
 # The comparison's common ground unless --set says otherwise: the paper's fine-tuner, pictures only when waited for.
 CONDITIONS = ("fine_tuner.mode=paper", "world.camera.mode=on_demand", "world.overhead.enabled=false")

@@ -10,9 +10,9 @@ from typing import Any
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.scenario import Scenario
-from robot_formation.loopback import PROFILES, RANGE, use_loopback
+from robot_formation.network.loopback import PROFILES, RANGE, use_loopback
 from robot_formation.paths import config_dir
-from robot_formation.yaml_files import read_yaml
+from robot_formation.system.yaml_files import read_yaml
 
 _SWITCH = ("true", "false", "True", "False", "1", "0")
 _OPENING, _CLOSING = "[{", "]}"

@@ -6,10 +6,10 @@ import shutil
 from collections import Counter
 from pathlib import Path
 
+from robot_formation.bag.bag_path import CUT_OFF_SUFFIX, PARTIAL_SUFFIX
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.place import CUT_OFF_SUFFIX, PARTIAL_SUFFIX
+from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.reader import read_bag
-from robot_formation.bag.recorder import METADATA_NAME
 from robot_formation.bag.recover import recover
 from robot_formation.bag.run_details import counts
 

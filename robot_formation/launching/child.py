@@ -36,7 +36,7 @@ class Child:
         parameters = folder / f"{stem}.yaml"
         content = {"/**": {"ros__parameters": process.ros_parameters()}}
         parameters.write_text(yaml.safe_dump(content), encoding="utf-8")
-        command = [sys.executable, "-m", f"robot_formation.nodes.{process.executable}", "--ros-args"]
+        command = [sys.executable, "-m", "robot_formation.nodes", process.executable, "--ros-args"]
         command += ["-r", f"__ns:={process.namespace}", "--params-file", str(parameters)]
         with self._log.open("wb") as log:
             self._popen = subprocess.Popen(

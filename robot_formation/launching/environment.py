@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from robot_formation.loopback import BEYOND, use_loopback
+from robot_formation.network.loopback import BEYOND, use_loopback
 
 
 def node_environment(domain: int, log_folder: Path) -> dict[str, str]:

@@ -11,24 +11,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.bag.bag_path import PARTIAL_SUFFIX, PathReservation, check_free, recover_hint
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.place import PARTIAL_SUFFIX, PathReservation, check_free, recover_hint
-from robot_formation.experiment.domain import DomainReservation
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
-from robot_formation.experiment.shared_memory import clean_orphans, fast_dds_files, is_of_domain
 from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
 from robot_formation.launching.outcome import recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
-from robot_formation.signal_handling import give_back, take
-from robot_formation.temporary_folder import RUN, temporary_folder
+from robot_formation.network.ros_domain import DomainReservation
+from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, is_of_domain
+from robot_formation.system.signal_handling import give_back, take
+from robot_formation.system.temporary_folder import RUN, temporary_folder
 
 if TYPE_CHECKING:
-    from robot_formation.nodes.monitor import Monitor
+    from robot_formation.nodes.progress.monitor import Monitor
 
 _POLL_S = 0.05
 _REMIND_S = 15.0  # without a line of progress
@@ -128,7 +128,7 @@ class Launcher:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""
         table = processes(self.scenario, self.bag, images=self.images)
         self._tell(f"starting {len(table)} nodes ...")
-        from robot_formation.nodes.monitor import Monitor  # here, since it needs the environment of the wheels
+        from robot_formation.nodes.progress.monitor import Monitor  # here, since it needs the environment of the wheels
 
         began = time.monotonic()
         setup, timesteps = self.scenario.setup, self.scenario.parameters("leader")["timesteps"]

@@ -1,1 +1,1 @@
-"""rclpy adapters, one file per executable."""
+"""The executables, and the rclpy adapters behind them."""

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.files import read_file
 from robot_formation.parameters import ParameterError
-from robot_formation.png_files import SIGNATURE, is_whole, png_head, unpacks_within
+from robot_formation.system.files import read_file
+from robot_formation.system.png_files import SIGNATURE, is_whole, png_head, unpacks_within
 
 MIN_SAMPLES = 4
 MAX_SAMPLES = 4096

@@ -1,1 +1,1 @@
-"""A Pixy2 in software: teaching colours, finding blocks of them and tracking the blocks."""
+"""From pictures to blocks: the Pixy2 in software, ArUco tags, and the overhead camera."""

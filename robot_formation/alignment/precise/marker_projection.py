@@ -1,0 +1,169 @@
+"""Where the beacon neighbour stands as its follower sees it, and which picture of the marker that gives.
+
+Both robots stand on curved ground. Their origins are taken to lie in one plane halfway between their tilts (a chord of
+the ground): the follower is tilted by half of the relative tilt one way, its neighbour by half of it the other way. So
+the relative tilt follows from the rows of the picture, and distances are those between the origins, as the formation
+error's are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
+from robot_formation.alignment.precise.marker_edges import Edge
+from robot_formation.geometry.se2 import Motion
+from robot_formation.parameters import parameter
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+X, Y, YAW, CURVATURE, SADDLE, SKEW = range(6)
+"""State of the neighbour in the follower's level frame: x, y [m], yaw [rad]; the ground's curvature [1/m], by which the
+robots are tilted towards each other: its mean, half of what it is more along y than along x, and its mixed part."""
+SIZE = 6
+
+_CORNERS = {
+    (TARGET, "left"): [0, 1],
+    (TARGET, "right"): [2, 3],
+    (FRONT, "left"): [2, 3],
+    (FRONT, "right"): [4, 5],
+    (REAR, "left"): [6, 7],
+    (REAR, "right"): [0, 1],
+    (TARGET, "top"): [1, 3],
+    (TARGET, "bottom"): [0, 2],
+    (FRONT, "top"): [3, 5],
+    (FRONT, "bottom"): [2, 4],
+    (REAR, "top"): [1, 7],
+    (REAR, "bottom"): [0, 6],
+}
+_LEAST_DEPTH_M = 0.03
+
+
+@dataclass(frozen=True)
+class GeometryParameters:
+    """Camera and marker as built."""
+
+    focal_length_px: float = parameter(273.7, "Focal length", unit="px", low=10.0, high=1e4)
+    centre_x_px: float = parameter(157.5, "Column of the optical axis", unit="px", low=0.0, high=1e4)
+    centre_y_px: float = parameter(103.5, "Row of the optical axis", unit="px", low=0.0, high=1e4)
+    lens_y_m: float = parameter(-0.038, "Lens in base_link", unit="m", low=-1.0, high=1.0)
+    lens_z_m: float = parameter(0.126, "Lens in base_link", unit="m", low=0.0, high=2.0)
+    row_inset_px: float = parameter(
+        7.0,
+        "Columns that a slanting edge must leave in a row for the detector to report it",
+        unit="px",
+        low=0.0,
+        high=50.0,
+    )
+    marker_edge_m: float = parameter(0.06, "Edge of the marker's cube", unit="m", low=0.005, high=1.0)
+    marker_top_m: float = parameter(0.216, "Height of the marker's top", unit="m", low=0.01, high=2.0)
+
+
+class MarkerModel:
+    """Projects the neighbour's marker into the follower's camera, which looks to the left."""
+
+    def __init__(self, parameters: GeometryParameters) -> None:
+        self.parameters = p = parameters
+        half, low = p.marker_edge_m / 2.0, p.marker_top_m - p.marker_edge_m
+        ground = ((-half, -half), (half, -half), (half, half), (-half, half))
+        self._corners = np.array([(x, y, z) for x, y in ground for z in (low, p.marker_top_m)])
+        self._lens = np.array([0.0, p.lens_y_m, p.lens_z_m])
+
+    def pixels(self, states: Matrix) -> Matrix:
+        """Project the cube's corners for states (n, 6); returns columns and rows, (n, 8, 2) px."""
+        p = self.parameters
+        cosine, sine = np.cos(states[:, YAW])[:, None], np.sin(states[:, YAW])[:, None]
+        cx, cy, cz = self._corners.T
+        points = np.stack([cosine * cx - sine * cy, sine * cx + cosine * cy, np.broadcast_to(cz, (len(states), 8))], -1)
+        roll, pitch = relative_tilt(states)
+        half = _tilts(0.5 * roll, 0.5 * pitch)
+        points = np.einsum("nij,nkj->nki", half, points)
+        points[:, :, :2] += states[:, None, :2]
+        points = np.einsum("nij,nkj->nki", half, points) - self._lens
+        scale = p.focal_length_px / np.maximum(points[:, :, 1], _LEAST_DEPTH_M)
+        return np.stack([p.centre_x_px + points[:, :, 0] * scale, p.centre_y_px - points[:, :, 2] * scale], -1)
+
+    def edges(self, states: Matrix, edges: Sequence[Edge]) -> Matrix:
+        """Predict edges for states (n, 6), (n, edges) px."""
+        pixels = self.pixels(states)
+        found = np.empty((len(states), len(edges)))
+        for number, edge in enumerate(edges):
+            if edge.side == "width":
+                right, left = (pixels[:, _CORNERS[edge.face, side], 0].mean(axis=1) for side in ("right", "left"))
+                found[:, number] = right - left
+                continue
+            columns, rows = np.moveaxis(pixels[:, _CORNERS[edge.face, edge.side]], -1, 0)
+            if edge.side == "left":
+                found[:, number] = columns.min(axis=1)
+            elif edge.side == "right":
+                found[:, number] = columns.max(axis=1)
+            else:
+                found[:, number] = self._row(columns, rows, edge.side == "top")
+        return found
+
+    def _row(self, columns: Matrix, rows: Matrix, top: bool) -> Vector:
+        """Upper or lower end of a face: where its slanting edge leaves enough columns for the detector."""
+        end = rows.min(axis=1) if top else rows.max(axis=1)
+        other = rows.max(axis=1) if top else rows.min(axis=1)
+        width = np.abs(columns[:, 1] - columns[:, 0])
+        return np.asarray(end + (other - end) * np.minimum(1.0, self.parameters.row_inset_px / np.maximum(width, 1.0)))
+
+    def widths(self, state: Vector) -> dict[int, float]:
+        """Tell how wide each face appears, px; negative if it is turned away."""
+        return self.shown(state, (-math.inf, math.inf))
+
+    def shown(self, state: Vector, limits_px: tuple[float, float]) -> dict[int, float]:
+        """Tell how much of each face's width lies between two columns, px; negative if it is turned away."""
+        columns = np.clip(self.pixels(state[None])[0, :, 0], *limits_px)
+        middle = {edge: float(columns[corners].mean()) for edge, corners in _CORNERS.items()}
+        return {face: middle[face, "right"] - middle[face, "left"] for face in (TARGET, FRONT, REAR)}
+
+    def place(self, face: int, column_px: float, height_px: float, yaw: float) -> Vector:
+        """Guess the state from a face's column and height and a yaw, without tilt."""
+        p = self.parameters
+        depth = p.focal_length_px * p.marker_edge_m / max(height_px, 1.0)
+        half = p.marker_edge_m / 2.0
+        out = {TARGET: (0.0, -half), FRONT: (half, 0.0), REAR: (-half, 0.0)}[face]
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        x = (column_px - p.centre_x_px) / p.focal_length_px * depth - (cosine * out[0] - sine * out[1])
+        y = depth + p.lens_y_m - (sine * out[0] + cosine * out[1])
+        return np.array([x, y, yaw, 0.0, 0.0, 0.0])
+
+
+def relative_tilt(states: Matrix) -> tuple[Vector, Vector]:
+    """Return the neighbour's roll and pitch relative to the follower [rad], each (n,), for states (n, 6).
+
+    On a surface z = p^T S p / 2 about the follower, with S symmetric, the slopes at p are S p.
+    """
+    mean, more, mixed = (states[:, index] for index in (CURVATURE, SADDLE, SKEW))
+    x, y = states[:, X], states[:, Y]
+    return (mean + more) * y + mixed * x, -((mean - more) * x + mixed * y)
+
+
+def _tilts(roll: Vector, pitch: Vector) -> Matrix:
+    """Rotations (n, 3, 3) by small tilts about x and y."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    zero = np.zeros_like(roll)
+    return np.stack(
+        [np.stack([cp, sp * sr, sp * cr], -1), np.stack([zero, cr, -sr], -1), np.stack([-sp, cp * sr, cp * cr], -1)], 1
+    )
+
+
+def after_motion(state: Vector, motion: Motion) -> Vector:
+    """Return the state after the follower's motion."""
+    pose = pose_of(state).relative_to(motion)
+    c2, s2 = math.cos(2.0 * motion.yaw_rad), math.sin(2.0 * motion.yaw_rad)
+    more, mixed = state[SADDLE], state[SKEW]
+    ground = [state[CURVATURE], c2 * more - s2 * mixed, c2 * mixed + s2 * more]
+    return np.array([pose.x_m, pose.y_m, pose.yaw_rad, *ground])
+
+
+def pose_of(state: Vector) -> Motion:
+    """Return the neighbour's pose in the follower's level frame."""
+    return Motion(float(state[X]), float(state[Y]), float(state[YAW]))

@@ -1,0 +1,313 @@
+"""Estimate of the neighbour's pose from looks and known moves: a bank of iterated extended Kalman filters.
+
+Bearing and distance follow from one look; the heading only from how the picture changes over known moves, and from
+the faces beside the Target face. Until looks have decided, several headings are kept side by side (Gaussian sum
+filter: Sorenson and Alspach, Automatica 7, 1971; iterated update: Bell and Cathey, IEEE TAC 38, 1993; weights of
+stray edges: Huber, Robust Statistics, 1981).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET, Box
+from robot_formation.alignment.precise.marker_edges import EdgeParameters, View, one_marker, view
+from robot_formation.alignment.precise.marker_projection import (
+    CURVATURE,
+    SADDLE,
+    SIZE,
+    SKEW,
+    YAW,
+    MarkerModel,
+    Matrix,
+    Vector,
+    X,
+    Y,
+    after_motion,
+    relative_tilt,
+)
+from robot_formation.alignment.precise.pose_hypothesis import Hypothesis, LookUpdate
+from robot_formation.geometry.se2 import Motion
+from robot_formation.parameters import parameter
+from robot_formation.vision.pixy2.block import Block
+
+_KEPT_COST = 16.0
+_LIKELY_COST = 9.0
+_GATE_PX = 15.0
+_MOST_INFLATION = 30.0
+_NIS_GAIN = 0.5
+_HYPOTHESES = 50
+FACES = (TARGET, FRONT, REAR)
+
+
+@dataclass(frozen=True)
+class FilterParameters:
+    """How far the filter trusts moves, the ground and what it saw before."""
+
+    curvature_sigma_per_m: float = parameter(
+        0.15, "Mean curvature of the ground between the robots", unit="1/m", low=1e-4, high=10.0
+    )
+    curvature_drift_per_m: float = parameter(
+        0.0015,
+        "Change of the curvatures with each step of the neighbour; more where the NIS after steps is high",
+        unit="1/m",
+        low=0.0,
+        high=10.0,
+    )
+    saddle_sigma_per_m: float = parameter(
+        0.1,
+        "Half of the difference between the ground's curvatures along and across",
+        unit="1/m",
+        low=1e-4,
+        high=10.0,
+    )
+    skew_sigma_per_m: float = parameter(0.02, "Mixed part of the ground's curvature", unit="1/m", low=1e-4, high=10.0)
+    move_sigma: float = parameter(0.02, "Error of a measured move, share of its length", low=0.0, high=1.0)
+    move_floor_m: float = parameter(0.0007, "Error of a measured move, least", unit="m", low=0.0, high=0.1)
+    turn_sigma: float = parameter(0.06, "Error of a measured turn, share of it", low=0.0, high=1.0)
+    yaw_drift_rad: float = parameter(
+        0.0022,
+        "Turn by slip on a move of 10 cm, which the wheels don't measure; grows with the root of the way",
+        unit="rad",
+        low=0.0,
+        high=1.0,
+    )
+    neighbour_step_sigma_m: float = parameter(
+        0.02, "How far the neighbour's step may differ from the last one", unit="m", low=0.0, high=1.0
+    )
+    neighbour_sidestep_sigma_m: float = parameter(
+        0.0005,
+        "How far the neighbour's step leads aside from its heading, least; more where the NIS after steps is high",
+        unit="m",
+        low=0.0,
+        high=1.0,
+    )
+    calm_nis: float = parameter(
+        0.12,
+        "Mean NIS of the first look after a step up to which the noise of the step model is not inflated",
+        low=1e-4,
+        high=100.0,
+    )
+    slip_per_tilt: float = parameter(
+        0.76,
+        "Sideways slip of a driving robot: share of its way per radian of lateral slope",
+        unit="1/rad",
+        low=0.0,
+        high=100.0,
+    )
+    slip_growth: float = parameter(
+        12.0,
+        "How much that grows on the way down, per squared share by which drives go too far there",
+        unit="1/rad",
+        low=0.0,
+        high=1000.0,
+    )
+    turn_growth: float = parameter(
+        28.0,
+        "Relative turn by slip on the way down: per way, tilt and squared share by which drives go too far",
+        unit="1/(m rad)",
+        low=0.0,
+        high=1000.0,
+    )
+    neighbour_turn_sigma_rad: float = parameter(
+        0.003, "How far the neighbour turns by slip in its step", unit="rad", low=0.0, high=1.0
+    )
+
+
+class PoseFilter:
+    """Where the neighbour stands, as far as looks and moves tell."""
+
+    def __init__(self, model: MarkerModel, edges: EdgeParameters, parameters: FilterParameters) -> None:
+        self._model = model
+        self._edges = edges
+        self._looks = LookUpdate(model, edges)
+        self._p = parameters
+        self.hypotheses: list[Hypothesis] = []
+        self._nis = 0.0
+        self._stepped = False
+
+    @property
+    def known(self) -> bool:
+        """Whether there is any estimate."""
+        return bool(self.hypotheses)
+
+    @property
+    def best(self) -> Hypothesis:
+        """The likeliest hypothesis; only if there is one."""
+        return self.hypotheses[0]
+
+    @property
+    def yaw_sigma_rad(self) -> float:
+        """Standard deviation of the heading over all hypotheses."""
+        weights = np.array([math.exp(-0.5 * (h.cost - self.best.cost)) for h in self.hypotheses])
+        weights /= weights.sum()
+        yaws = np.array([h.state[YAW] for h in self.hypotheses])
+        inside = np.array([h.covariance[YAW, YAW] for h in self.hypotheses])
+        mean = float(weights @ yaws)
+        return math.sqrt(float(weights @ (inside + (yaws - mean) ** 2)))
+
+    def likely(self) -> list[Vector]:
+        """List the states that looks have not yet ruled out, the likeliest first."""
+        return [h.state for h in self.hypotheses if h.cost <= self.best.cost + _LIKELY_COST]
+
+    def forget(self) -> None:
+        """Drop everything."""
+        self.hypotheses = []
+
+    def assume_heading(self, sigma_rad: float) -> None:
+        """Take for known that the neighbour heads as the follower does, up to a standard deviation."""
+        row = np.zeros((1, SIZE))
+        row[0, YAW] = 1.0
+        for hypothesis in self.hypotheses:
+            innovation = -hypothesis.state[YAW]
+            cost = _gain_update(hypothesis, row, np.array([innovation]), np.array([sigma_rad**2]))
+            hypothesis.cost += cost
+        self._prune()
+
+    # --- moves ------------------------------------------------------------------------------------------------------
+
+    def moved(self, motion: Motion) -> None:
+        """Take a move of the follower as its encoders measured it."""
+        p = self._p
+        length = math.hypot(motion.x_m, motion.y_m)
+        # The turn comes first: its error swings the way that follows.
+        yaw = (p.turn_sigma * motion.yaw_rad) ** 2 + p.yaw_drift_rad**2 * length / 0.1
+        place = p.move_floor_m**2 + (p.move_sigma * length) ** 2 + (0.02 * motion.yaw_rad) ** 2
+        noise = np.diag([place, place, yaw, 0.0, 0.0, 0.0])
+        for hypothesis in self.hypotheses:
+            self._propagate(hypothesis, motion, noise)
+
+    def _propagate(self, hypothesis: Hypothesis, motion: Motion, noise: Matrix) -> None:
+        state = hypothesis.state
+        jacobian = np.eye(SIZE)
+        c, s = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+        turn = np.array([[c, s], [-s, c]])
+        jacobian[:2, :2] = turn
+        jacobian[SADDLE:, SADDLE:] = turn.T @ turn.T  # by twice the angle, the other way
+        moved = after_motion(state, motion)
+        # A turn that was not measured moves the neighbour about the follower.
+        swing = np.eye(SIZE)
+        swing[X, YAW], swing[Y, YAW] = -moved[Y], moved[X]
+        hypothesis.state = moved
+        hypothesis.covariance = jacobian @ hypothesis.covariance @ jacobian.T + swing @ noise @ swing.T
+
+    def neighbour_stepped(self, step: Motion, overshoot: float = 0.0, sidestep_sigma_m: float | None = None) -> None:
+        """Take that the neighbour has made a step of about this size in its own frame.
+
+        Args:
+            step: its way ahead, and aside if it slips as the follower does.
+            overshoot: how much farther than asked for the robots drive here, share of the way.
+            sidestep_sigma_m: how certain the way aside is; by default as in the parameters.
+        """
+        p = self._p
+        overshoot = max(0.0, overshoot)
+        slip = p.slip_per_tilt + p.slip_growth * overshoot**2
+        # What the ground does to a step is a model of the default world; where it fails, it counts for less.
+        inflation = min(_MOST_INFLATION, max(1.0, self._nis / p.calm_nis))
+        sidestep = p.neighbour_sidestep_sigma_m * inflation if sidestep_sigma_m is None else sidestep_sigma_m
+        self._stepped = True
+        for hypothesis in self.hypotheses:
+            state, covariance = hypothesis.state, hypothesis.covariance
+            c, s = math.cos(state[YAW]), math.sin(state[YAW])
+            along = np.array([[c, -s], [s, c]])
+            # The neighbour slips as the follower does, and by as much more as it is tilted more.
+            tilt_rad = float(relative_tilt(state[None])[0][0])
+            aside = step.y_m - slip * tilt_rad * abs(step.x_m)
+            jacobian = np.eye(SIZE)
+            jacobian[:2, YAW] = along @ (-aside, step.x_m)
+            hypothesis.state = state.copy()
+            hypothesis.state[:2] += along @ (step.x_m, aside)
+            hypothesis.state[YAW] += p.turn_growth * overshoot**2 * tilt_rad * abs(step.x_m)
+            noise = np.zeros((SIZE, SIZE))
+            noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, sidestep**2]) @ along.T
+            noise[YAW, YAW] = p.neighbour_turn_sigma_rad**2
+            for part in (CURVATURE, SADDLE, SKEW):
+                noise[part, part] = (p.curvature_drift_per_m * inflation) ** 2
+            hypothesis.covariance = jacobian @ covariance @ jacobian.T + noise
+
+    # --- looks ------------------------------------------------------------------------------------------------------
+
+    def look(self, boxes: dict[int, Box]) -> None:
+        """Take a look's boxes, at least one."""
+        if self._stepped and self.hypotheses:
+            self._nis += _NIS_GAIN * (self.nis(boxes) - self._nis)
+        self._stepped = False
+        if not self.hypotheses:
+            self.hypotheses = self._guesses(boxes)
+        self._take(view(boxes, self._edges))
+        if not self.hypotheses:
+            self.hypotheses = self._guesses(boxes)
+            self._take(view(boxes, self._edges))
+
+    def _take(self, seen: View) -> None:
+        for hypothesis in self.hypotheses:
+            self._looks.update(hypothesis, seen)
+        self._prune()
+
+    def plausible(self, blocks: Sequence[Block]) -> list[Block]:
+        """Leave out blocks that lie where no hypothesis expects their face: other objects of a marker colour."""
+        if not self.hypotheses:
+            return one_marker(blocks, lambda block: -block.width * block.height)
+        expected = self._model.pixels(self.best.state[None])[0].mean(axis=0)
+        kept = [block for block in blocks if any(self._expects(hypothesis, block) for hypothesis in self.hypotheses)]
+        return one_marker(kept, lambda block: math.hypot(block.x - expected[0], block.y - expected[1]))
+
+    def _expects(self, hypothesis: Hypothesis, block: Block) -> bool:
+        if block.signature not in FACES:
+            return False
+        corners = self._model.pixels(hypothesis.state[None])[0]
+        spread = 3.0 * math.sqrt(float(np.trace(hypothesis.covariance[:2, :2]))) + 0.5 * math.sqrt(
+            float(hypothesis.covariance[YAW, YAW])
+        )
+        gate = _GATE_PX + self._model.parameters.focal_length_px * spread / max(0.1, float(hypothesis.state[Y]))
+        low, high = corners.min(axis=0) - gate, corners.max(axis=0) + gate
+        return bool(low[0] <= block.x <= high[0] and low[1] <= block.y <= high[1])
+
+    def nis(self, boxes: dict[int, Box]) -> float:
+        """Normalised innovation squared (NIS) of a look, per edge; 1 is expected of a consistent filter."""
+        return self._looks.nis(self.hypotheses, view(boxes, self._edges))
+
+    def whole(self, boxes: dict[int, Box]) -> bool:
+        """Whether a look's boxes, at least one, fit together for some pose: not those of a partly covered marker."""
+        seen = view(boxes, self._edges)
+        guesses = sorted(self._guesses(boxes), key=lambda guess: abs(guess.state[YAW]))  # the likeliest first
+        return any(self._looks.fits(guess, seen) for guess in guesses)
+
+    def _guesses(self, boxes: dict[int, Box]) -> list[Hypothesis]:
+        face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
+        box = boxes[face]
+        guesses = []
+        for degrees in range(-92, 93, 4):
+            guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
+            ground = [self._p.curvature_sigma_per_m**2, self._p.saddle_sigma_per_m**2, self._p.skew_sigma_per_m**2]
+            covariance = np.diag([0.1**2, 0.1**2, math.radians(3.0) ** 2, *ground])
+            guesses.append(Hypothesis(guess, covariance))
+        return guesses
+
+    def _prune(self) -> None:
+        """Keep the likely hypotheses, one of each kind, the best first."""
+        kept: list[Hypothesis] = []
+        self.hypotheses = [h for h in self.hypotheses if h.sane]
+        for hypothesis in sorted(self.hypotheses, key=lambda h: h.cost):
+            if hypothesis.cost > self._least() + _KEPT_COST:
+                continue
+            if all(abs(hypothesis.state[YAW] - other.state[YAW]) > math.radians(1.5) for other in kept):
+                kept.append(hypothesis)
+        self.hypotheses = kept[:_HYPOTHESES]
+
+    def _least(self) -> float:
+        return min(h.cost for h in self.hypotheses)
+
+
+def _gain_update(hypothesis: Hypothesis, h: Matrix, innovation: Vector, variance: Vector) -> float:
+    """Kalman update in place; returns its cost."""
+    covariance = hypothesis.covariance
+    scatter = h @ covariance @ h.T + np.diag(variance)
+    gain = np.linalg.solve(scatter, h @ covariance).T
+    hypothesis.state = hypothesis.state + gain @ innovation
+    hypothesis.covariance = covariance - gain @ h @ covariance
+    return float(innovation @ np.linalg.solve(scatter, innovation))

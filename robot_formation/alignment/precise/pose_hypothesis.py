@@ -1,0 +1,130 @@
+"""One hypothesis about the neighbour's pose, and what a look makes of it: an iterated extended Kalman update."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robot_formation.alignment.paper_rules import FRONT, TARGET
+from robot_formation.alignment.precise.marker_edges import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, sliver
+from robot_formation.alignment.precise.marker_projection import SIZE, YAW, MarkerModel, Matrix, Vector, X, Y
+
+_ITERATIONS = 6
+_STRAY_SIGMAS = 1.5
+_WORST_RESIDUALS, _OUTLIER_SIGMAS = 9.0, 2.5
+"""Squared residuals of a look's edges from which on the marker isn't seen whole; where they begin to grow less."""
+_BORDER_PX = 8.0
+"""Of a face that the picture cuts off, so much more must show before it is always reported."""
+
+
+@dataclass
+class Hypothesis:
+    """State (6,) and covariance (6, 6) as in `relative_pose`, and twice the negative log likelihood of all looks."""
+
+    state: Vector
+    covariance: Matrix
+    cost: float = 0.0
+
+    @property
+    def sane(self) -> bool:
+        """Whether it is about a neighbour that could be in view."""
+        x, y, yaw = (float(self.state[index]) for index in (X, Y, YAW))
+        finite = math.isfinite(self.cost) and bool(np.isfinite(self.state).all())
+        return finite and math.hypot(x, y) < 2.0 and abs(yaw) < 2.0
+
+
+class LookUpdate:
+    """Brings hypotheses and looks together."""
+
+    def __init__(self, model: MarkerModel, edges: EdgeParameters) -> None:
+        self._model = model
+        self._edges = edges
+
+    def update(self, hypothesis: Hypothesis, seen: View) -> None:
+        """Update a hypothesis in place; the cost is that of the posterior's residuals and of the way to it."""
+        edges = [*self._trusted(hypothesis.state, seen), *self._exceeded(hypothesis.state, seen)]
+        if not edges:
+            return
+        measured = np.array([edge.position_px for edge in edges])
+        sigmas = np.array([edge.sigma_px for edge in edges])
+        noise = np.diag(sigmas**2)
+        prior, covariance = hypothesis.state, hypothesis.covariance
+        state = prior
+        for number in range(_ITERATIONS):
+            h, predicted = self._linearise(state, edges)
+            # Huber's weights: an edge that contradicts the others, as of a broken block, pulls with limited force.
+            strays = np.maximum(1.0, np.abs(measured - predicted) / (_STRAY_SIGMAS * sigmas)) if number else 1.0
+            noise = np.diag(sigmas**2 * strays)
+            scatter = h @ covariance @ h.T + noise
+            gain = np.linalg.solve(scatter, h @ covariance).T
+            change = prior + gain @ (measured - predicted - h @ (prior - state)) - state
+            change[YAW] = max(-0.3, min(0.3, change[YAW]))
+            state = state + change
+            if float(np.abs(change).max()) < 1e-5:
+                break
+        h, predicted = self._linearise(state, edges)
+        kept = np.eye(SIZE) - gain @ h
+        hypothesis.covariance = kept @ covariance @ kept.T + gain @ noise @ gain.T
+        hypothesis.state = state
+        residual, way = measured - predicted, state - prior
+        hypothesis.cost += float(residual @ (residual / np.diag(noise)) + way @ np.linalg.solve(covariance, way))
+        hypothesis.cost += float(np.linalg.slogdet(scatter)[1])
+        hypothesis.cost += self._contradiction(state, seen)
+
+    def fits(self, guess: Hypothesis, seen: View) -> bool:
+        """Whether a look fits a pose near a guess, which is updated in place."""
+        self.update(guess, seen)
+        return guess.sane and self._residuals(guess.state, seen) < _WORST_RESIDUALS
+
+    def nis(self, hypotheses: Sequence[Hypothesis], seen: View) -> float:
+        """Normalised innovation squared (NIS) of a look by the best hypothesis, per edge."""
+        if not seen.edges:
+            return 0.0
+        costs = []
+        for hypothesis in hypotheses:
+            h, predicted = self._linearise(hypothesis.state, seen.edges)
+            innovation = np.array([edge.position_px for edge in seen.edges]) - predicted
+            scatter = h @ hypothesis.covariance @ h.T + np.diag([4.0 * edge.sigma_px**2 for edge in seen.edges])
+            costs.append(float(innovation @ np.linalg.solve(scatter, innovation)) / len(seen.edges))
+        return min(costs)
+
+    def _residuals(self, state: Vector, seen: View) -> float:
+        edges = [*self._trusted(state, seen), *self._exceeded(state, seen)]
+        if not edges:
+            return 0.0
+        predicted = self._linearise(state, edges)[1]
+        ratios = (np.array([edge.position_px for edge in edges]) - predicted) / [edge.sigma_px for edge in edges]
+        strays = np.maximum(1.0, np.abs(ratios) / _OUTLIER_SIGMAS)
+        return float(np.sum(ratios**2 / strays)) + self._contradiction(state, seen)
+
+    def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:
+        steps = 1e-4 * np.eye(SIZE)
+        found = self._model.edges(np.concatenate([state[None], state + steps, state - steps]), edges)
+        return ((found[1 : SIZE + 1] - found[SIZE + 1 :]) / 2e-4).T, found[0]
+
+    def _trusted(self, state: Vector, seen: View) -> list[Edge]:
+        """List the edges; a Front face that is not reported may shift the Target block's right one."""
+        if FRONT in seen.faces or (front_px := self._model.widths(state)[FRONT]) <= 0.0:
+            return list(seen.edges)
+        return [
+            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (TARGET, "right") else edge
+            for edge in seen.edges
+        ]
+
+    def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
+        """List the bounds on faces that were not reported which a state breaks."""
+        columns = self._model.pixels(state[None])[0, :, 0]
+        cut = columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX
+        shown, spare = self._model.shown(state, (0.0, PICTURE_WIDTH_PX)), _BORDER_PX if cut else 0.0
+        return [edge for edge in hidden(seen, self._edges) if shown[edge.face] > edge.position_px + spare]
+
+    def _contradiction(self, state: Vector, seen: View) -> float:
+        """Charge faces that were reported and should not have been, or the other way round."""
+        widths = self._model.widths(state)
+        cost = sum(max(0.0, 1.0 - widths[face]) ** 2 / 4.0 for face in seen.faces)
+        for edge in self._exceeded(state, seen):
+            cost += ((widths[edge.face] - edge.position_px) / edge.sigma_px) ** 2
+        return cost

@@ -1,0 +1,248 @@
+"""`mode: precise`: corrections from an estimate of the neighbour's pose, which lasts over all looks and moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from robot_formation.alignment.modes import Frames
+from robot_formation.alignment.paper_rules import TARGET, Box, Decision, Verdict
+from robot_formation.alignment.precise.actuation_model import ActuationModel
+from robot_formation.alignment.precise.marker_edges import EdgeParameters, mean_boxes
+from robot_formation.alignment.precise.marker_projection import (
+    GeometryParameters,
+    MarkerModel,
+    Vector,
+    X,
+    Y,
+    after_motion,
+    pose_of,
+)
+from robot_formation.alignment.precise.motion_planner import FORMATION, MotionPlanner, PlannerParameters, count_legs
+from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, SearchParameters
+from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.parameters import parameter
+
+_IMPLAUSIBLE_NIS = 6.0
+"""NIS of a look from which on it is taken not to show the whole marker."""
+_VIEWPOINTS_M = (0.135, -0.135, 0.135, -0.12, 0.12)
+"""Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
+_VIEWPOINT_BESIDE_M = 0.312
+_VIEWPOINT_TOLERANCE = Motion(0.02, 0.02, math.radians(6.0))
+"""How far from such a place is near enough."""
+_SPARE_MOVES = 2
+"""Moves left over for last corrections."""
+_ENOUGH_MOVES = 6
+"""As long as so many are left, the way back isn't counted."""
+_DEADBAND, _FIRST_DEADBAND = 0.8, 0.5
+"""Share of the tolerance up to which an offset is left alone while the other axis is corrected; in timestep 0."""
+_UNKNOWN_HEADING_RAD = 0.08
+_ASIDE_RAD = 0.25
+_FIRST_SIDESTEP_SIGMA_M = 0.002
+
+
+@dataclass(frozen=True)
+class PreciseParameters:
+    """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
+
+    u_tolerance_m: float = parameter(0.009, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
+    v_tolerance_m: float = parameter(0.006, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    heading_tolerance_rad: float = parameter(
+        math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
+    )
+    turn_rad: float = parameter(
+        math.radians(0.8), "Heading error from which on the prediction move turns too", unit="rad", low=0.001, high=1.0
+    )
+    first_share: float = parameter(
+        0.58, "Share of these offsets that the first alignment leaves alone", low=0.01, high=1.0
+    )
+    certain_rad: float = parameter(
+        math.radians(0.8),
+        "Standard deviation of the heading that ends the first alignment",
+        unit="rad",
+        low=1e-3,
+        high=1.0,
+    )
+    placed_heading_rad: float = parameter(
+        math.radians(1.0),
+        "Standard deviation of the heading of a follower that was placed in formation by hand",
+        unit="rad",
+        low=1e-4,
+        high=1.0,
+    )
+    placed_m: float = parameter(
+        0.02, "Offset up to which a follower counts as placed in formation", unit="m", low=0.0, high=0.2
+    )
+    averaged_frames: int = parameter(10, "Last frames of a look that are averaged", low=1, high=600)
+    max_moves: int = parameter(
+        14, "Corrections per timestep after which the follower goes on unaligned", low=1, high=1000
+    )
+    geometry: GeometryParameters = GeometryParameters()
+    edges: EdgeParameters = EdgeParameters()
+    filter: FilterParameters = FilterParameters()
+    approach: PlannerParameters = PlannerParameters()
+    search: SearchParameters = SearchParameters()
+
+
+class PreciseAlignment:
+    """Keeps the estimate over the timesteps; one decision a look."""
+
+    def __init__(self, parameters: PreciseParameters, first_step_m: float) -> None:
+        self._p = parameters
+        self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
+        self._planner = MotionPlanner(parameters.approach)
+        self._actuation = ActuationModel()
+        self._search = NeighbourSearch(parameters.search)
+        self._step_m = first_step_m
+        self._moves = 0
+        self._timestep = 0
+        self._last = Motion()
+        self._viewpoints: list[float] | None = None  # those still to be visited; None: not chosen yet
+
+    def restart(self, timestep: int) -> None:
+        """Begin a timestep: the neighbour has made its step."""
+        self._moves = 0
+        self._timestep = timestep
+        self._last = Motion()
+        if timestep > 0:
+            self._filter.neighbour_stepped(
+                Motion(self._step_m, self._actuation.slip * self._step_m),
+                self._actuation.overshoot,
+                None if self._actuation.drives else _FIRST_SIDESTEP_SIGMA_M,
+            )
+
+    def turn(self) -> float:
+        """Tell the turn [rad] to make with the prediction move."""
+        if not self._filter.known:
+            return 0.0
+        heading = pose_of(self._filter.best.state).then(FORMATION).yaw_rad
+        return heading if abs(heading) > self._p.turn_rad else 0.0
+
+    def moved(self, asked: Motion, motion: Motion) -> None:
+        """Take a measured move."""
+        self._filter.moved(motion)
+        self._actuation.moved(asked, motion)
+        self._last = motion
+
+    def offset(self) -> Motion | None:
+        """Estimate the way to the formation position in the follower's frame."""
+        return pose_of(self._filter.best.state).then(FORMATION) if self._filter.known else None
+
+    def assess(self, frames: Frames) -> Decision:
+        """Decide what the last look calls for."""
+        boxes = self._boxes(frames)
+        strange = bool(boxes) and self._strange(boxes)
+        if strange and self._search.looks >= self._p.search.hold_looks and self._filter.whole(boxes):
+            # What doesn't fit for so long is not in the way: the neighbour, or the follower, was moved.
+            self._filter.forget()
+            strange = False
+        if not boxes or strange:
+            decision = self._search.missed(self._last if self._moves else Motion(), self.offset())
+            self._moves += count_legs(decision.motion)
+            return decision
+        self._search.found()
+        first = not self._filter.known
+        self._filter.look(boxes)
+        if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
+            self._filter.assume_heading(self._p.placed_heading_rad)
+            self._viewpoints = []
+        return self._correct()
+
+    def _correct(self) -> Decision:
+        p, state = self._p, self._filter.best.state
+        unsure = self._filter.yaw_sigma_rad > p.certain_rad
+        motion, reason = Motion(), ""
+        if unsure and self._timestep == 0 and self._viewpoints != []:
+            motion, reason = self._to_see_more(state)
+        if motion == Motion():
+            if self._within(pose_of(state).then(FORMATION)):
+                return Decision(Verdict.ALIGNED, reason="inside the tolerances")
+            motion, reason = self._to_formation(state)
+        if motion == Motion():
+            return Decision(Verdict.UNALIGNED, reason="no way to the formation position keeps clear of the neighbour")
+        if self._moves + count_legs(motion) > p.max_moves:
+            return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves")
+        self._moves += count_legs(motion)
+        return Decision(Verdict.MOVE, self._actuation.compensated(motion), reason)
+
+    def _to_see_more(self, state: Vector) -> tuple[Motion, str]:
+        """Choose the next motion to a place from where the heading shows; none if too few moves would be left."""
+        motion, reason = self._first(state)
+        if motion != Motion():
+            return motion, reason
+        states = self._filter.likely()
+        for viewpoint in self._places(state):
+            motion = self._outside_deadband(self._planner.next(states, viewpoint), _VIEWPOINT_TOLERANCE)
+            if motion == Motion():
+                continue
+            left = self._outside_deadband(pose_of(after_motion(state, motion)).then(FORMATION), self._deadband())
+            needed = count_legs(motion) + self._planner.moves(left) + _SPARE_MOVES
+            affordable = self._p.max_moves - self._moves >= min(needed, _ENOUGH_MOVES)
+            return (motion, "to see two faces") if affordable else (Motion(), "")
+        return Motion(), ""
+
+    def _to_formation(self, state: Vector) -> tuple[Motion, str]:
+        """Choose the next motion to the formation position and say why."""
+        motion, reason = self._first(state)
+        if motion != Motion():
+            return motion, reason
+        motion = self._planner.next(self._filter.likely(), FORMATION)
+        return self._outside_deadband(motion, self._deadband()), "to the formation position"
+
+    def _first(self, state: Vector) -> tuple[Motion, str]:
+        """Choose what comes before any goal: to keep clear, and to face a marker whose heading is hardly known."""
+        states = self._filter.likely()
+        if not self._planner.apart(state) and (away := self._planner.away(states)) != Motion():
+            return away, "too close: away along u"
+        if self._filter.yaw_sigma_rad > _UNKNOWN_HEADING_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
+            return self._planner.face(states), "turn towards the marker"
+        return Motion(), ""
+
+    def _deadband(self) -> Motion:
+        p = self._p
+        share = _DEADBAND if self._timestep > 0 else _FIRST_DEADBAND * p.first_share
+        return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
+
+    def _boxes(self, frames: Frames) -> dict[int, Box]:
+        last = frames[-self._p.averaged_frames :]
+        return mean_boxes([self._filter.plausible(blocks) for blocks in last])
+
+    def _strange(self, boxes: dict[int, Box]) -> bool:
+        """Whether a look shows no whole marker, or one where none is expected."""
+        return not self._filter.whole(boxes) or (self._filter.known and self._filter.nis(boxes) >= _IMPLAUSIBLE_NIS)
+
+    def _placed(self, state: Vector) -> bool:
+        return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m
+
+    def _within(self, way: Motion) -> bool:
+        p = self._p
+        share = 1.0 if self._timestep > 0 else p.first_share
+        return (
+            abs(way.y_m) <= share * p.u_tolerance_m
+            and abs(way.x_m) <= share * p.v_tolerance_m
+            and abs(way.yaw_rad) <= p.heading_tolerance_rad
+        )
+
+    @staticmethod
+    def _outside_deadband(motion: Motion, deadband: Motion) -> Motion:
+        """Leave out legs that are hardly worth a move."""
+        turn, forward, left = motion.legs
+        return Motion.from_legs(
+            turn if abs(turn) > deadband.yaw_rad else 0.0,
+            forward if abs(forward) > deadband.x_m else 0.0,
+            left if abs(left) > deadband.y_m else 0.0,
+        )
+
+    def _places(self, state: Vector) -> Iterator[Motion]:
+        """Yield the places left to look from, behind and ahead in turn; the one that is asked beyond is done with.
+
+        The outer edges of Front and Rear are biased alike, so that the two sides' errors in heading cancel.
+        """
+        if self._viewpoints is None:
+            behind = pose_of(state).x_m > 0.0
+            self._viewpoints = [-place if behind else place for place in _VIEWPOINTS_M]
+        while self._viewpoints:
+            yield Motion(self._viewpoints[0], -_VIEWPOINT_BESIDE_M, 0.0)
+            self._viewpoints.pop(0)

@@ -1,0 +1,1 @@
+"""Many independent runs: a pool of processes."""

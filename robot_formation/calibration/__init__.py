@@ -1,0 +1,1 @@
+"""Calibrating a robot's drive and its camera: rig, measurements, fits, files' checks, reports and figures."""

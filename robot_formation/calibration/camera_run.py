@@ -1,0 +1,135 @@
+"""Camera calibration: looks at the whole grid on several cores, and the bag of what was seen.
+
+Paper, section "Visual fine-tuning process calibrations".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import BrokenExecutor
+from pathlib import Path
+from typing import Any
+
+from robot_formation import conversions, names
+from robot_formation.bag.message_recorder import Recorder
+from robot_formation.bag.qos import TopicQos
+from robot_formation.batch.pool import run_parallel
+from robot_formation.calibration.alignment_trial import FOLLOWER
+from robot_formation.calibration.camera_grid import Conditions, Position, measure, stand
+from robot_formation.calibration.camera_samples import CameraSample
+from robot_formation.components.catalogue import KINDS
+from robot_formation.drive.curves import CalibrationError
+from robot_formation.experiment.scenario import Scenario
+from robot_formation.parameters import from_mapping
+from robot_formation.world import Pose
+from robot_formation.world.description import robot_description
+
+BAG_NAME = "vision_bag"
+_NS = 10**9
+
+
+def conditions_of(scenario: Scenario) -> Conditions:
+    """Take the looks' conditions out of a scenario.
+
+    Raises:
+        FormationError: on a wrong parameter, or signatures that can't be read.
+    """
+    world, detector, tuner = (
+        from_mapping(KINDS[kind].parameter_class(), scenario.parameters(kind), where=kind)
+        for kind in ("world", "block_detector", "fine_tuner")
+    )
+    detector.load()
+    return Conditions(world, detector, tuner.look, scenario.setup.seed)
+
+
+def record_of(scenario: Scenario, step_m: float) -> dict[str, Any]:
+    """List by name all that the looks' results depend on."""
+    found: dict[str, Any] = {"step_m": step_m, "seed": scenario.setup.seed}
+    for kind, parts in _RELEVANT.items():
+        found.update(
+            {f"{kind}.{name}": value for name, value in scenario.parameters(kind).items() if name.startswith(parts)}
+        )
+    return found
+
+
+_RELEVANT = {
+    "world": ("surface", "chassis.", "wheels.", "camera.", "marker."),
+    "block_detector": ("",),
+    "fine_tuner": ("look.",),
+}
+
+
+def carry_out(positions: Iterable[Position], conditions: Conditions, jobs: int) -> Iterator[list[CameraSample]]:
+    """Look at all positions, on several cores by joblib; yields each position's samples, in order.
+
+    Raises:
+        CalibrationError: if a worker process dies.
+    """
+    try:
+        yield from run_parallel(measure, ((position, conditions) for position in positions), jobs)
+    except BrokenExecutor:
+        raise CalibrationError(
+            f"a worker process died (too little memory for --jobs {jobs}?); the same command goes on"
+        ) from None
+
+
+def write_bag(path: Path, samples: Iterable[CameraSample], conditions: Conditions, metadata: Mapping[str, str]) -> Path:
+    """Write what was seen, one place after the other: the follower's blocks, both true poses, the camera's calibration.
+
+    Each attainable place has its own time, in which the longest look fits; poses are stamped at its beginning, blocks
+    at its last frame.
+
+    Raises:
+        BagError: if the path is taken or can't be written.
+    """
+    world, look = conditions.world, conditions.look
+    rate = world.camera.min_frames_per_second
+    longest = look.frames + look.max_extensions * look.extra_frames
+    period_ns = (longest // rate + 1) * _NS
+    recorder = Recorder(path, metadata)
+    try:
+        _write_descriptions(recorder, conditions)
+        for number, sample in enumerate(s for s in samples if s.attainable):
+            begin_ns = number * period_ns
+            poses = stand(world, sample.u_m, sample.v_m, sample.clockwise_deg)
+            for robot, pose in zip((names.LEADER, FOLLOWER), poses, strict=True):
+                _record(recorder, "", names.ground_truth_odom(robot), _odometry(pose, robot, begin_ns))
+            end_ns = begin_ns + sample.frames * _NS // rate
+            blocks = conversions.blocks(sample.blocks, f"{FOLLOWER}/{names.OPTICAL_FRAME}", end_ns)
+            _record(recorder, FOLLOWER, names.BLOCKS, blocks)
+    finally:
+        recorder.close()
+    return path
+
+
+def _write_descriptions(recorder: Recorder, conditions: Conditions) -> None:
+    world = conditions.world
+    p = world.camera
+    centre = (p.centre_x_px, p.centre_y_px)
+    frame = f"{FOLLOWER}/{names.OPTICAL_FRAME}"
+    info = conversions.camera_info(p.width_px, p.height_px, p.focal_length_px, centre, frame, 0)
+    _record(recorder, "", names.camera_info(FOLLOWER), info)
+    for robot in (names.LEADER, FOLLOWER):
+        text = robot_description(robot, world, camera=robot == FOLLOWER)
+        _record(recorder, "", names.robot_description(robot), conversions.string(text))
+
+
+def _odometry(pose: Pose, robot: str, stamp_ns: int) -> Any:
+    rest = (0.0, 0.0, 0.0)
+    return conversions.body_odometry(
+        pose.position,
+        pose.orientation,
+        rest,
+        rest,
+        frame=names.WORLD_FRAME,
+        child=f"{robot}/{names.BASE_FRAME}",
+        stamp_ns=stamp_ns,
+    )
+
+
+def _record(recorder: Recorder, namespace: str, topic: names.Topic, message: Any) -> None:
+    name = names.absolute(f"/{namespace}", topic.name)
+    if name not in recorder.topics:
+        q = topic.qos
+        recorder.add_topic(name, topic.type, TopicQos(q.history, q.depth, q.reliability, q.durability))
+    recorder.record(name, topic.type, conversions.to_cdr(message))

@@ -1,0 +1,1 @@
+"""The follower's state machine: predict, move, look, correct."""

@@ -1,0 +1,300 @@
+"""The follower's timestep as a state machine: wait for the neighbour, move by the prediction, look, correct, report.
+
+Paper, fig. "algorithm scheme", with a collection phase of three timesteps in which the follower first moves by the
+leader's step and then repeats its own previous displacement. Events go in, actions come out in the order to be carried
+out; there is no input or output here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from robot_formation.alignment.modes import AlignmentMode, PaperMode
+from robot_formation.alignment.paper_rules import AlignmentParameters, Decision, Verdict
+from robot_formation.alignment.precise.precise_mode import PreciseAlignment, PreciseParameters
+from robot_formation.follower.alignment_state import AlignmentState, State
+from robot_formation.geometry.se2 import Motion
+from robot_formation.parameters import parameter
+from robot_formation.vision.pixy2.block import Block
+
+COLLECTION_TIMESTEPS = 3
+
+
+@dataclass(frozen=True)
+class LookParameters:
+    """How long a look lasts. It must outlast the camera's block filtering, or new blocks are missed."""
+
+    frames: int = parameter(22, "Frames of a look: block filtering 40 shows a new block in frame 21", low=1, high=600)
+    stable_frames: int = parameter(3, "Last frames that must report the same blocks", low=1, high=600)
+    extra_frames: int = parameter(10, "Frames asked for when the blocks are not stable", low=1, high=600)
+    max_requests: int = parameter(
+        3, "Requests for frames that don't come before the camera counts as dead", low=0, high=100
+    )
+    patience_s: float = parameter(
+        60.0,
+        "Wall time without a message after which missing frames are asked for; 0: never",
+        unit="s",
+        low=0.0,
+        high=1e6,
+    )
+    max_extensions: int = parameter(3, "Extensions of a look before its last frame is taken as it is", low=0, high=100)
+
+
+@dataclass(frozen=True)
+class FineTunerParameters:
+    """Parameters of the follower's fine-tuning controller."""
+
+    mode: str = parameter("precise", "How the camera's blocks are used", choices=("paper", "precise"))
+    first_step_m: float = parameter(
+        0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
+    )
+    # The bodies are 8 cm apart in formation: a wild forecast must not push the neighbour.
+    max_v_m: float = parameter(0.1, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2)
+    max_u_m: float = parameter(
+        0.05, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
+    )
+    calibration_file: str = parameter(
+        "", "YAML file of 'formation calibrate vision': its values go before those of 'alignment'; empty: none"
+    )
+    look: LookParameters = LookParameters()
+    alignment: AlignmentParameters = AlignmentParameters()
+    precise: PreciseParameters = PreciseParameters()
+
+
+@dataclass(frozen=True)
+class SendMove:
+    """Ask the drive for a displacement."""
+
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class RequestFrames:
+    """Ask the camera for frames."""
+
+    count: int
+
+
+@dataclass(frozen=True)
+class Report:
+    """The timestep's net displacement, what is left by the camera's estimate (None: Target face not seen), and what the
+    displacement would have been had the prediction move gone as commanded (None: its end is unknown).
+    """
+
+    displacement: Motion
+    residual: Motion | None
+    commanded: Motion | None
+
+
+@dataclass(frozen=True)
+class Done:
+    """Tick: the follower has finished this timestep."""
+
+    timestep: int
+
+
+@dataclass(frozen=True)
+class Lost:
+    """The leader is lost: the run ends in good order."""
+
+
+@dataclass(frozen=True)
+class Warn:
+    """Something a person should know; the run goes on."""
+
+    text: str
+
+
+Action = SendMove | RequestFrames | Report | Done | State | Lost | Warn
+
+
+class Phase(Enum):
+    """What the follower waits for."""
+
+    NEIGHBOUR = auto()
+    MOVE = auto()
+    LOOK = auto()
+    PREDICTION = auto()
+    LOST = auto()
+
+
+class FineTuner:
+    """State machine of one follower. Stamps are integer nanoseconds of simulated time and tell which frames count."""
+
+    def __init__(self, parameters: FineTunerParameters) -> None:
+        self._p = parameters
+        self._phase = Phase.NEIGHBOUR
+        self._alignment = _mode(parameters)
+        self._displacement = Motion()
+        self._previous = Motion()
+        self._asked = Motion()
+        self._out_of_view = False
+        self._resent = 0
+        self._prediction: Motion | None = None
+        self._planned_move: Motion | None = None  # the prediction move, until it has ended
+        self._actuation_error: Motion | None = None
+        self._frames: list[Sequence[Block]] = []
+        self._frames_wanted = 0
+        self._extensions = 0
+        self._look_from_ns = -1
+        self._neighbour = -1
+        self.timestep = 0
+        self.stamp_ns = 0
+
+    @property
+    def phase(self) -> Phase:
+        """What the follower waits for now."""
+        return self._phase
+
+    def neighbour_done(self, timestep: int) -> list[Action]:
+        """The beacon neighbour stands at its place of this timestep."""
+        self._neighbour = max(self._neighbour, timestep)
+        return self._begin() if self._phase is Phase.NEIGHBOUR else []
+
+    def moved(self, motion: Motion, stamp_ns: int) -> list[Action]:
+        """The drive has finished the outstanding move."""
+        if self._phase is not Phase.MOVE:
+            return [Warn("a 'moved' that nobody asked for is ignored")]
+        self.stamp_ns = stamp_ns
+        planned, self._planned_move = self._planned_move, None
+        if not motion.finite:
+            return [
+                Warn("a 'moved' that is not finite is ignored: the displacement of this move is lost"),
+                *self._look(),
+            ]
+        if planned is not None:
+            self._actuation_error = Motion(motion.x_m - planned.x_m, motion.y_m - planned.y_m)
+        self._displacement = self._displacement.then(motion)
+        self._alignment.moved(self._asked, motion)
+        return self._look()
+
+    def frame(self, blocks: Sequence[Block], stamp_ns: int) -> list[Action]:
+        """The camera's blocks of one frame. Only frames later than the last fact count."""
+        if self._phase is not Phase.LOOK or stamp_ns <= self._look_from_ns:
+            return []
+        self._resent = 0
+        self._frames.append(blocks)
+        if len(self._frames) < self._frames_wanted:
+            return []
+        self.stamp_ns = stamp_ns
+        if not self._stable() and self._extensions < self._p.look.max_extensions:
+            self._extensions += 1
+            self._frames_wanted += self._p.look.extra_frames
+            return [RequestFrames(self._p.look.extra_frames)]
+        return self._decide(self._alignment.assess(self._frames))
+
+    def stalled(self) -> list[Action]:
+        """Nothing comes any more: ask again for missing frames; a camera that stays silent loses the leader."""
+        if self._phase is not Phase.LOOK:
+            return []
+        self._resent += 1
+        if self._resent > self._p.look.max_requests:
+            self._phase = Phase.LOST
+            return [State(AlignmentState.LOST), Warn("the camera gives no frames any more"), Lost()]
+        missing = self._frames_wanted - len(self._frames)
+        return [Warn(f"{missing} frames of a look are missing: asked for again"), RequestFrames(missing)]
+
+    def prediction(self, mean: Motion | None) -> list[Action]:
+        """The predictor's displacement for the next timestep, answered to this report; None if it has none."""
+        if self._phase is not Phase.PREDICTION:
+            return [Warn("a prediction that nobody asked for is ignored")]
+        actions: list[Action] = []
+        if mean is not None and mean.finite:
+            self._prediction = mean
+        else:
+            actions.append(Warn("no finite prediction: the previous displacement is repeated"))
+            self._prediction = self._previous
+        return [*actions, *self._finish()]
+
+    def _begin(self) -> list[Action]:
+        if self._neighbour < self.timestep:
+            return []
+        self._alignment.restart(self.timestep)
+        self._displacement = Motion()
+        self._actuation_error = None
+        if self.timestep == 0:
+            return [State(AlignmentState.ALIGN), *self._look()]
+        return self._go()
+
+    def _go(self) -> list[Action]:
+        """Make the prediction move, and take a known heading error out with it."""
+        wish = self._planned()
+        motion = Motion.from_uv(
+            max(-self._p.max_u_m, min(self._p.max_u_m, wish.u_m)), max(-self._p.max_v_m, min(self._p.max_v_m, wish.v_m))
+        )
+        self._planned_move = motion
+        collecting = self.timestep <= COLLECTION_TIMESTEPS
+        move = Motion(motion.x_m, motion.y_m, self._alignment.turn())
+        actions: list[Action] = [
+            State(AlignmentState.COLLECT if collecting else AlignmentState.PREDICT),
+            *self._move(move),
+        ]
+        if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
+            actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"))
+        return actions
+
+    def _planned(self) -> Motion:
+        if self.timestep == 1:
+            return Motion(x_m=self._p.first_step_m)
+        if self.timestep <= COLLECTION_TIMESTEPS or self._prediction is None:
+            return self._previous
+        return self._prediction
+
+    def _look(self) -> list[Action]:
+        self._phase = Phase.LOOK
+        self._frames = []
+        self._frames_wanted = self._p.look.frames
+        self._extensions = 0
+        self._look_from_ns = self.stamp_ns
+        return [RequestFrames(self._frames_wanted)]
+
+    def _stable(self) -> bool:
+        last = self._frames[-self._p.look.stable_frames :]
+        kinds = [sorted((block.signature, block.index) for block in blocks) for blocks in last]
+        return all(kind == kinds[0] for kind in kinds)
+
+    def _decide(self, decision: Decision) -> list[Action]:
+        if decision.verdict is Verdict.LOST:
+            self._phase = Phase.LOST
+            return [State(AlignmentState.LOST), Lost()]
+        if decision.verdict is Verdict.LOOK:
+            self._out_of_view = True
+            return [State(AlignmentState.HOLD), *self._look()]
+        if decision.verdict is Verdict.SEARCH:
+            self._out_of_view = True
+            return [State(AlignmentState.SEARCH, decision.reason), *self._move(decision.motion)]
+        actions: list[Action] = [State(AlignmentState.REACQUIRED)] if self._out_of_view else []
+        self._out_of_view = False
+        if decision.verdict is Verdict.MOVE:
+            return [*actions, State(AlignmentState.CORRECT, decision.reason), *self._move(decision.motion)]
+        aligned = decision.verdict is Verdict.ALIGNED
+        actions.append(State(AlignmentState.ALIGNED if aligned else AlignmentState.UNALIGNED))
+        if decision.verdict is Verdict.UNALIGNED:
+            actions.append(Warn(decision.reason))
+        if self.timestep == 0:
+            return [*actions, *self._finish()]
+        self._phase = Phase.PREDICTION
+        self._previous = Motion(self._displacement.x_m, self._displacement.y_m)
+        commanded = None
+        if (error := self._actuation_error) is not None:
+            commanded = Motion(self._displacement.x_m - error.x_m, self._displacement.y_m - error.y_m)
+        return [*actions, Report(self._displacement, self._alignment.offset(), commanded)]
+
+    def _move(self, motion: Motion) -> list[Action]:
+        self._phase = Phase.MOVE
+        self._asked = motion
+        return [SendMove(motion)]
+
+    def _finish(self) -> list[Action]:
+        finished = self.timestep
+        self.timestep += 1
+        self._phase = Phase.NEIGHBOUR
+        return [Done(finished), *self._begin()]
+
+
+def _mode(parameters: FineTunerParameters) -> AlignmentMode:
+    if parameters.mode == "paper":
+        return PaperMode(parameters.alignment)
+    return PreciseAlignment(parameters.precise, parameters.first_step_m)

@@ -1,0 +1,1 @@
+"""The leader: one step per timestep, then it waits for the formation."""

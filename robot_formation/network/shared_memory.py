@@ -1,0 +1,144 @@
+"""Removes what killed ROS processes leave in shared memory.
+
+Fast DDS gives a process segments (`fastrtps_<16 hex digits>`) and ports (`fastrtps_port<N>` with a semaphore
+`sem.fastrtps_port<N>_mutex`). Beside each lies a file ending in `_el` (`_sl` where several share a port) that its owner
+keeps locked (flock), and the kernel opens that lock when the owner dies, however that happens. A process that ends in
+good order removes its files itself.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import re
+from pathlib import Path
+
+from robot_formation.network.ros_domain import FIRST_PORT, domain_ports
+from robot_formation.network.shared_memory_space import SHARED_MEMORY
+
+_NAME = re.compile(r"(?:sem\.)?(?P<group>fastrtps_(?:[0-9a-f]{16}|port(?P<port>\d+)))(?P<part>_el|_sl|_mutex)?")
+
+
+class TracingFiles:
+    """Notes LTTng's wake-up files at a time before ROS is loaded, so that those made since can be removed.
+
+    ROS's tracing library makes `lttng-ust-wait-*` as soon as it is loaded and never removes it; the next program that
+    traces makes it anew.
+    """
+
+    def __init__(self, folder: Path = SHARED_MEMORY) -> None:
+        self._folder = folder
+        self._before = set(folder.glob("lttng-ust-wait-*"))
+
+    def remove_new(self) -> None:
+        """Remove what was made since."""
+        for path in set(self._folder.glob("lttng-ust-wait-*")) - self._before:
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def fast_dds_files(folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
+    """List Fast DDS' files by the segment or port that they belong to; empty where the folder can't be read."""
+    groups: dict[str, list[str]] = {}
+    with contextlib.suppress(OSError):
+        for name in sorted(os.listdir(folder)):
+            match = _NAME.fullmatch(name)
+            if match:
+                groups.setdefault(match["group"], []).append(name)
+    return groups
+
+
+def find_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
+    """List the groups of files whose owners are all dead; removes nothing. Arguments as for clean_orphans."""
+    groups = {group: names for group, names in fast_dds_files(folder).items() if is_of_domain(group, domain)}
+    if not groups:
+        return {}
+    in_use = _used_files(folder)
+    return {group: names for group, names in groups.items() if in_use.isdisjoint(names) and _unlocked(folder, names)}
+
+
+def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> list[str]:
+    """Remove the files whose owners are dead, and never a living process' files.
+
+    Args:
+        domain: Leave the ports of other domains alone. Segments, and the ports below 7400, carry no domain in their
+            name and are removed in any case. None: every domain.
+        folder: Where shared memory lies.
+
+    Returns:
+        The names of the removed files. Files that this user may not remove are passed over.
+    """
+    removed: list[str] = []
+    for names in find_orphans(domain, folder).values():
+        held = _lock_all(folder, names)  # kept while removing, so that no new process takes the files over meanwhile
+        if held is None:
+            continue
+        for name in names:
+            with contextlib.suppress(OSError):
+                (folder / name).unlink()
+                removed.append(name)
+        _unlock(held)
+    return removed
+
+
+def is_of_domain(group: str, domain: int | None) -> bool:
+    """Tell whether a group may be one of this domain: a segment, a port of the domain, or one that all share."""
+    match = _NAME.fullmatch(group)
+    if domain is None or match is None or match["port"] is None:
+        return True
+    port = int(match["port"])
+    return port < FIRST_PORT or port in domain_ports(domain)
+
+
+def _unlocked(folder: Path, names: list[str]) -> bool:
+    held = _lock_all(folder, names)
+    if held is not None:
+        _unlock(held)
+    return held is not None
+
+
+def _lock_all(folder: Path, names: list[str]) -> list[int] | None:
+    """Lock a group's lock files; returns their descriptors, None if an owner lives.
+
+    There may be none to lock: the last one in good order to leave a port that a killed process shared takes the lock
+    files with it and leaves the port.
+    """
+    held: list[int] = []
+    for name in names:
+        if not name.endswith(("_el", "_sl")):
+            continue
+        try:
+            held.append(os.open(folder / name, os.O_RDONLY | os.O_CLOEXEC))
+            fcntl.flock(held[-1], fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            _unlock(held)
+            return None
+    return held
+
+
+def _unlock(descriptors: list[int]) -> None:
+    for descriptor in descriptors:
+        os.close(descriptor)
+
+
+def _used_files(folder: Path) -> set[str]:
+    """List the files in the folder that any process has open or mapped, as far as this user can see.
+
+    A starting process opens its lock file just before it locks it, so a free lock alone does not mean a dead owner.
+    """
+    prefix = f"{folder}/"
+    found: set[str] = set()
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            for line in (process / "maps").read_text().splitlines():
+                place = line.find(prefix)
+                if place >= 0:
+                    found.add(line[place + len(prefix) :])
+        with contextlib.suppress(OSError):
+            for descriptor in os.listdir(process / "fd"):
+                with contextlib.suppress(OSError):
+                    target = os.readlink(process / "fd" / descriptor)
+                    if target.startswith(prefix):
+                        found.add(target[len(prefix) :])
+    return found

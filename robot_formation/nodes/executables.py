@@ -1,0 +1,53 @@
+"""The package's executables (`ros2 run robot_formation NAME`), one function each.
+
+What a node does is in components/, and for recorder, player and progress in the folders here.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from robot_formation.nodes.host.signals import stop_on_signals
+
+
+def _component(kind: str) -> int:
+    stop_on_signals()  # before ROS is imported, which takes a second
+    from robot_formation.nodes.host.component_node import main_of
+
+    return main_of(kind)
+
+
+world = partial(_component, "world")
+overhead_tracker = partial(_component, "overhead_tracker")
+drive = partial(_component, "drive")
+block_detector = partial(_component, "block_detector")
+predictor = partial(_component, "predictor")
+fine_tuner = partial(_component, "fine_tuner")
+leader = partial(_component, "leader")
+
+
+def recorder() -> int:
+    """Run the recorder until it ends."""
+    stop_on_signals()
+    from robot_formation.nodes.host.component_node import run_node
+    from robot_formation.nodes.recorder.recorder_node import Executable
+
+    return run_node("recorder", Executable)
+
+
+def player() -> int:
+    """Run the player until it ends."""
+    stop_on_signals()
+    from robot_formation.nodes.host.component_node import run_node
+    from robot_formation.nodes.player.player_node import Executable
+
+    return run_node("player", Executable)
+
+
+def progress() -> int:
+    """Run the progress node until it ends."""
+    stop_on_signals()
+    from robot_formation.nodes.host.component_node import run_node
+    from robot_formation.nodes.progress.progress_node import Executable
+
+    return run_node("progress", Executable)

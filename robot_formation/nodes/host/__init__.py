@@ -1,0 +1,1 @@
+"""An rclpy node around a component: parameters, messages out, signals, help."""

@@ -1,0 +1,93 @@
+"""A node inside a command-line verb: the user's ROS domain, one-line errors, and nothing left behind."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import signal
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import InvalidNamespaceException, InvalidNodeNameException
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from robot_formation.errors import FormationError
+from robot_formation.network.loopback import stay_here
+from robot_formation.network.shared_memory import TracingFiles
+from robot_formation.system.signal_handling import give_back, take
+
+
+@contextlib.contextmanager
+def node_session(name: str, *, namespace: str = "", **options: Any) -> Iterator[Node]:
+    """Join the ROS graph of the environment (ROS_DOMAIN_ID and the like) as one node; signals stay with the caller.
+
+    Where the environment doesn't say how far discovery reaches, it is this machine.
+
+    Args:
+        name: the node's name.
+        namespace: its namespace.
+        **options: as for rclpy's Node.
+
+    Raises:
+        FormationError: the graph can't be joined (a bad ROS_DOMAIN_ID, a middleware that isn't installed).
+    """
+    tracing = TracingFiles()
+    stay_here(os.environ)
+    context = Context()
+    node = None
+    try:
+        try:
+            rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+            node = Node(name, namespace=namespace, context=context, **options)
+        except (InvalidNamespaceException, InvalidNodeNameException) as error:
+            raise FormationError(" ".join(str(error).split())) from error
+        except Exception as error:
+            if type(error).__name__ not in ("RCLError", "RCLInvalidROSArgsError"):
+                raise
+            reason = str(error).splitlines()[0]
+            raise FormationError(
+                f"can't join the ROS graph: {reason}; 'formation doctor' looks for the cause"
+            ) from error
+        yield node
+    finally:
+        if node is not None:
+            node.destroy_node()
+        if context.ok():
+            rclpy.shutdown(context=context)
+        # The shared memory of this participant is given back with the last reference, and rclpy's objects form cycles.
+        del node, context
+        gc.collect()
+        tracing.remove_new()
+
+
+class Interrupts:
+    """Counts SIGINT, SIGTERM and SIGHUP (unless it is ignored), so that work ends in good order; the second one
+    interrupts it. A context manager; call it to ask whether one has come.
+    """
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._before: dict[signal.Signals, Any] = {}
+
+    def __call__(self) -> bool:
+        """Tell whether a signal has come."""
+        return self._count > 0
+
+    def __enter__(self) -> Interrupts:
+        self._before = take(self._take)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        give_back(self._before)
+
+    def _take(self, number: int, frame: Any) -> None:
+        self._count += 1
+        if self._count > 1:
+            raise KeyboardInterrupt

@@ -1,0 +1,1 @@
+"""The player node: a bag's topics and its clock."""

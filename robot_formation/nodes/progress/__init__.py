@@ -1,0 +1,1 @@
+"""The lines that tell how a run is getting on, in the launcher or as a node of their own."""

@@ -1,0 +1,1 @@
+"""The recorder node: any topic, raw, into a bag."""

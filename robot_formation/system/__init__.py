@@ -1,0 +1,1 @@
+"""Files, temporary folders and signals: what is asked of the operating system."""

@@ -1,0 +1,1 @@
+"""The overhead camera: its calibration, the robots' reference dots, and their tracks."""

@@ -1,0 +1,48 @@
+"""The same scenario and seed give the same run to the last bit, whatever the machine does meanwhile."""
+
+import pytest
+
+from graph_tools import BusyCores, displacements, launch, short_scenario
+from robot_formation.experiment.in_process import run_in_process
+
+pytestmark = pytest.mark.graph
+
+
+@pytest.fixture(scope="module")
+def in_process(tmp_path_factory):
+    """Displacements of the in-process run by camera mode."""
+    found = {}
+    for mode in ("on_demand", "stream"):
+        bag = tmp_path_factory.mktemp("in_process") / "bag"
+        result = run_in_process(short_scenario(f"world.camera.mode={mode}"), bag, {})
+        assert result.exit_code == 0
+        found[mode] = displacements(bag)
+        assert len(found[mode]) == 4
+    return found
+
+
+@pytest.mark.parametrize("mode", ["on_demand", "stream"])
+def test_the_node_graph_gives_the_in_process_run(tmp_path, in_process, mode):
+    result = launch(short_scenario(f"world.camera.mode={mode}"), tmp_path / "bag")
+    assert (result.exit_code, result.reason) == (0, "")
+    assert displacements(tmp_path / "bag") == in_process[mode]
+
+
+def test_loaded_cores_change_nothing(tmp_path, in_process):
+    with BusyCores():
+        result = launch(short_scenario(), tmp_path / "bag")
+    assert result.exit_code == 0
+    assert displacements(tmp_path / "bag") == in_process["on_demand"]
+
+
+@pytest.mark.parametrize(("mode", "timesteps"), [("on_demand", 4), ("stream", 2)])
+def test_random_delays_in_every_callback_change_nothing(tmp_path, in_process, mode, timesteps):
+    scenario = short_scenario(f"world.camera.mode={mode}", f"leader.timesteps={timesteps}")
+    result = launch(scenario, tmp_path / "bag", callback_delay_s=0.05)
+    assert result.exit_code == 0
+    assert displacements(tmp_path / "bag") == in_process[mode][:timesteps]
+
+
+def test_another_seed_gives_another_run(tmp_path, in_process):
+    run_in_process(short_scenario(seed=4), tmp_path / "bag", {})
+    assert displacements(tmp_path / "bag") != in_process["on_demand"]

@@ -1,0 +1,138 @@
+"""Which sockets the nodes open, and who finds them."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from graph_lab import DEADLINE_S
+from robot_formation import names
+from robot_formation.network import loopback
+from robot_formation.network.loopback import PROFILES, RANGE, stay_here, use_loopback
+from robot_formation.paths import config_dir
+
+PROFILE = str(config_dir() / "loopback.xml")
+LOOPBACK = ("0100007F", "00000000000000000000000001000000")
+
+
+def sockets(pid):
+    """Local addresses of a process's UDP and TCP sockets as /proc shows them: hexadecimal, without the port."""
+    links = [os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir() if entry.is_symlink()]
+    own = {link[8:-1] for link in links if link.startswith("socket:")}
+    found = []
+    for table in ("udp", "udp6", "tcp", "tcp6"):
+        for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            words = line.split()
+            if words[9] in own:
+                found.append(words[1].partition(":")[0])
+    return found
+
+
+def on_graph(test):
+    return pytest.mark.graph(pytest.mark.xdist_group("network")(test))
+
+
+@on_graph
+def test_no_socket_of_a_node_is_open_to_the_network_and_others_find_it(lab, tmp_path):
+    heard = lab.collect(names.DIAGNOSTICS)
+    nodes = {
+        "/leader/drive": lab.start("drive", namespace="/leader"),
+        "/follower_1/predictor": lab.start("predictor", namespace="/follower_1"),
+        "/recorder": lab.start("recorder", "-p", f"path:={tmp_path / 'bag'}"),
+    }
+    lab.until(lambda: {status.name for array in heard for status in array.status} >= nodes.keys())
+    for name, process in nodes.items():
+        addresses = sockets(process.pid)
+        assert addresses, name
+        assert set(addresses) <= set(LOOPBACK), name
+
+
+@on_graph
+def test_a_node_that_ros_itself_limits_to_this_machine_is_found_too(lab):
+    """A command of ROS's own, say: it knows nothing of the profile."""
+    foreign = {name: value for name, value in lab.environment.items() if name not in PROFILES}
+    code = """
+import rclpy
+rclpy.init()
+node = rclpy.create_node("foreign")
+while "drive" not in node.get_node_names():
+    pass
+print("found", flush=True)
+"""
+    lab.start("drive", namespace="/leader")
+    process = lab.open([sys.executable, "-c", code], {**foreign, RANGE: "LOCALHOST"})
+    assert process.stdout.readline() == "found\n"
+
+
+MANY = """
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+
+contexts = [Context() for _ in range(14)]
+nodes = []
+for number, context in enumerate(contexts):
+    rclpy.init(context=context)
+    nodes.append(Node(f"node_{number}", context=context))
+while any(len(set(node.get_node_names())) < len(nodes) for node in nodes):
+    pass
+print("found", flush=True)
+"""
+
+
+@on_graph
+def test_fourteen_participants_of_one_domain_find_each_other(lab):
+    process = lab.open([sys.executable, "-c", MANY], lab.environment)
+    out, error = process.communicate(timeout=DEADLINE_S)
+    assert out == "found\n", error
+
+
+@pytest.mark.parametrize("middleware", [{}, {"RMW_IMPLEMENTATION": "rmw_fastrtps_dynamic_cpp"}])
+@pytest.mark.parametrize("earlier", [{}, dict.fromkeys(PROFILES, PROFILE)])
+def test_discovery_on_this_machine_gets_the_profile(middleware, earlier):
+    environment = {RANGE: "LOCALHOST", **middleware, **earlier}
+    use_loopback(environment)
+    assert environment == {RANGE: "SYSTEM_DEFAULT", **middleware, **dict.fromkeys(PROFILES, PROFILE)}
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        {},
+        {RANGE: "SUBNET"},
+        {RANGE: "LOCALHOST", "ROS_STATIC_PEERS": "192.168.0.7"},
+        {RANGE: "LOCALHOST", "ROS_DISCOVERY_SERVER": "192.168.0.7:11811"},
+        {RANGE: "LOCALHOST", "RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"},
+        {RANGE: "LOCALHOST", PROFILES[0]: "/home/somebody/mine.xml"},
+        {RANGE: "LOCALHOST", PROFILES[1]: "/home/somebody/mine.xml"},
+    ],
+)
+def test_whoever_asks_for_something_else_gets_that(wish):
+    environment = dict(wish)
+    use_loopback(environment)
+    assert environment == wish
+
+
+def test_without_the_profile_ros_limits_discovery_itself(monkeypatch, tmp_path):
+    monkeypatch.setattr(loopback, "config_dir", lambda: tmp_path)
+    environment = {RANGE: "LOCALHOST"}
+    use_loopback(environment)
+    assert environment == {RANGE: "LOCALHOST"}
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, "SYSTEM_DEFAULT"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "SUBNET"),
+        ({"ROS_STATIC_PEERS": "10.0.0.2"}, None),
+        ({"ROS_DISCOVERY_SERVER": "10.0.0.2:11811"}, None),
+        ({"ROS_LOCALHOST_ONLY": "1"}, None),
+    ],
+)
+def test_verbs_stay_on_this_machine_unless_the_user_asks_otherwise(given, expected):
+    environment = dict(given)
+    stay_here(environment)
+    assert environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == expected
+    assert (expected == "SYSTEM_DEFAULT") == any(name in environment for name in PROFILES)

@@ -1,0 +1,39 @@
+"""Blocks of a neighbour at a known pose: what an ideal camera with the detector's known biases would report."""
+
+import numpy as np
+
+from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
+from robot_formation.alignment.precise.marker_edges import EdgeParameters
+from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+from robot_formation.vision.pixy2.block import Block
+
+MODEL = MarkerModel(GeometryParameters())
+EDGES = EdgeParameters()
+BOWL_CURVATURE_PER_M = 0.2
+_LEAST_WIDTH_PX = {TARGET: 9.0, FRONT: 9.0, REAR: 15.0}
+_CORNERS = {TARGET: [0, 1, 2, 3], FRONT: [2, 3, 4, 5], REAR: [6, 7, 0, 1]}
+
+
+def state_of(x_m=0.0, y_m=FORMATION_DISTANCE_M, yaw_rad=0.0, curvature_per_m=BOWL_CURVATURE_PER_M):
+    """The neighbour in the follower's frame."""
+    return np.array([x_m, y_m, yaw_rad, curvature_per_m, 0.0, 0.0])
+
+
+def blocks_of(state):
+    """Blocks of the faces that are wide enough to be reported, edges biased as the detector does."""
+    pixels, widths = MODEL.pixels(state[None])[0], MODEL.widths(state)
+    seen = [face for face, least in _LEAST_WIDTH_PX.items() if widths[face] > least]
+    return [_block(face, pixels[_CORNERS[face]], seen, index) for index, face in enumerate(sorted(seen))]
+
+
+def _block(face, corners, seen, index):
+    e = EDGES
+    biases = {
+        TARGET: (e.target_left_px + (0.5 if FRONT in seen else 0.0), e.target_right_px),
+        FRONT: (e.front_left_px, e.front_right_px[-1]),
+        REAR: (e.rear_left_px[-1], 0.0),
+    }[face]
+    left, right = corners[:, 0].min() + biases[0], corners[:, 0].max() + biases[1]
+    top, bottom = corners[:, 1].min() + e.target_top_px, corners[:, 1].max() + e.target_bottom_px
+    return Block(face, 0.5 * (left + right), 0.5 * (top + bottom), right - left, bottom - top, index=index)

@@ -1,0 +1,104 @@
+"""Starts real runs for the graph tests, in the test's own folder, and looks at what they leave behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from robot_formation.analysis.from_bag import load_run
+from robot_formation.experiment import scenario as scenarios
+from robot_formation.launching.launcher import Launcher
+
+SHORT = ("leader.timesteps=4", "world.camera.mode=on_demand")
+
+STRICT = {
+    "PYTHONDEVMODE": "1",
+    "PYTHONMALLOC": "default",  # without the checks of memory, which are about C code, and slow
+    # The ROS wheels' parser of message definitions (lark-parser 0.12) imports modules of Python that are to go.
+    "PYTHONWARNINGS": "error,ignore:module 'sre_:DeprecationWarning",
+}
+"""Python's development mode, and warnings as errors; one about a file left open only is printed."""
+
+
+def short_scenario(*settings, track="two", seed=3):
+    """A scenario of a few timesteps."""
+    return scenarios.override(scenarios.load_track(track), [f"seed={seed}", *SHORT, *settings])
+
+
+def displacements(bag):
+    """What the follower says it drove, exactly as recorded."""
+    return [
+        (entry.stamp_ns, entry.motion.x_m, entry.motion.y_m, entry.motion.yaw_rad)
+        for entry in load_run(bag).followers[0].displacements
+    ]
+
+
+def launch(scenario, bag, **options):
+    """Run a scenario through the node graph; returns the result."""
+    return Launcher(scenario, bag, **options).run()
+
+
+def formation(*arguments, timeout=300, **options):
+    """Call the command line as a user does; neither it nor a node that it starts may give a Python warning."""
+    command = [sys.executable, "-m", "robot_formation.cli", *map(str, arguments)]
+    options["env"] = {**options.get("env", os.environ), **STRICT}
+    completed = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False, **options)
+    assert "Warning" not in completed.stderr
+    return completed
+
+
+def json_of(completed):
+    """Read what a verb printed with --json: nothing else may stand on standard output."""
+    return json.loads(completed.stdout)
+
+
+def node_processes():
+    """Process ids of all node processes of this project on the machine."""
+    found = set()
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if b"robot_formation.nodes\0" in entry.read_bytes():
+                found.add(int(entry.parent.name))
+        except OSError:
+            continue
+    return found
+
+
+def alive(pid):
+    """Whether a process runs (a zombie does not)."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+class BusyCores:
+    """Keeps every core busy with processes of the same priority; a context manager."""
+
+    def __enter__(self):
+        code = "while True: pass"
+        self._processes = [subprocess.Popen([sys.executable, "-S", "-c", code]) for _ in range(os.cpu_count() or 2)]
+        return self
+
+    def __exit__(self, *error):
+        for process in self._processes:
+            process.kill()
+            process.wait()
+
+
+class Killer:
+    """Sends a signal to one node of a run, or to another process, when the run has finished a number of timesteps."""
+
+    def __init__(self, node, number, after_timesteps):
+        self._node, self._number, self._after = node, number, after_timesteps
+        self.pids = {}
+
+    def started(self, domain, pids):
+        self.pids = dict(pids)
+
+    def say(self, text):
+        if text.startswith(f"timestep {self._after:2d}/"):
+            os.kill(self.pids[self._node], self._number)

@@ -1,0 +1,147 @@
+"""A predictor's state: JSON and back goes on to the last bit, and what is damaged is refused in a sentence."""
+
+import copy
+import json
+
+import numpy as np
+import pytest
+
+from predictor_helpers import predictor, timesteps
+from robot_formation.errors import FormationError
+from robot_formation.koopman.predictors import NAMES, PredictionError, Predictor, PredictorParameters
+from robot_formation.koopman.predictors.parameters import ClosingParameters, EdmdParameters, FormationParameters
+
+pytestmark = pytest.mark.slow
+
+VARIANTS = {
+    **{name: {"name": name} for name in NAMES},
+    "edmd, windowed": {"name": "edmd", "edmd": EdmdParameters(window=5, forgetting=0.9)},
+    "edmd+close, delayed": {"name": "edmd+close", "edmd": EdmdParameters(dictionary="constant delay:3")},
+    "measured, forgetting": {"name": "measured", "forgetting": 0.8},
+    "formation, rbf": {
+        "name": "formation",
+        "formation": FormationParameters(edmd=EdmdParameters(dictionary="rbf:3 identity", prior=0.1)),
+    },
+}
+
+
+@pytest.fixture(params=VARIANTS)
+def values(request):
+    return VARIANTS[request.param]
+
+
+def shown(values, count):
+    found = predictor(**values)
+    for timestep in timesteps(count):
+        found.observe(*timestep)
+    return found
+
+
+def diagnostics(found):
+    seen = found.diagnostics()
+    arrays = [None if part is None else part.tolist() for part in (seen.k, seen.innovation)]
+    return arrays, seen.condition_number, seen.notes
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 12, 40])
+def test_json_and_back_goes_on_to_the_last_bit(values, count):
+    one = shown(values, count)
+    text = json.dumps(one.state(), allow_nan=False)
+    other = Predictor.from_state(PredictorParameters(**values), json.loads(text))
+    assert other.observations == count
+    assert json.dumps(other.state()) == text
+    if count:
+        assert all((a == b).all() for a, b in zip(one.predict(), other.predict(), strict=True))
+    assert diagnostics(one) == diagnostics(other)
+    for timestep in timesteps(12, seed=9):
+        one.observe(*timestep)
+        other.observe(*timestep)
+        assert all((a == b).all() for a, b in zip(one.predict(), other.predict(), strict=True))
+    assert diagnostics(one) == diagnostics(other)
+
+
+def test_a_state_is_of_the_moment_when_it_was_taken(values):
+    found = shown(values, 10)
+    state = found.state()
+    before = copy.deepcopy(state)
+    for timestep in timesteps(10, seed=2):
+        found.observe(*timestep)
+    assert state == before
+
+
+def paths(value, path=()):
+    """Every place in nested lists and mappings."""
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield from paths(inner, (*path, key))
+
+
+def damaged(state, path, wrong):
+    found = copy.deepcopy(state)
+    if not path:
+        return wrong
+    place = found
+    for key in path[:-1]:
+        place = place[key]
+    if wrong == "missing":
+        del place[path[-1]]
+    else:
+        place[path[-1]] = wrong
+    return found
+
+
+@pytest.mark.parametrize("wrong", [None, float("nan"), float("inf"), "text", [], {}, [[1.0]], -1, "missing"], ids=str)
+def test_a_damaged_state_is_refused_in_a_sentence_or_does_no_harm(values, wrong):
+    parameters = PredictorParameters(**values)
+    state = shown(values, 6).state()
+    refusals = []
+    for path in paths(state):
+        try:
+            found = Predictor.from_state(parameters, damaged(state, path, wrong))
+        except PredictionError as error:
+            refusals.append(str(error))
+            continue
+        for timestep in timesteps(3, seed=4):
+            found.observe(*timestep)
+            assert np.isfinite(found.predict().mean).all()
+            assert np.isfinite(found.predict().covariance).all()
+    assert len(refusals) > 5
+    for text in refusals:
+        assert text.startswith("the stored state of the predictor ")
+        assert "\n" not in text
+
+
+def test_nothing_that_is_not_finite_gets_in(values):
+    parameters = PredictorParameters(**values)
+    state = shown(values, 6).state()
+    for path in paths(state):
+        place = state
+        for key in path:
+            place = place[key]
+        if isinstance(place, float):
+            with pytest.raises(PredictionError):
+                Predictor.from_state(parameters, damaged(state, path, float("nan")))
+
+
+@pytest.mark.parametrize(
+    ("learned", "asked", "said"),
+    [
+        ({"name": "measured"}, {"name": "previous"}, "it is of 'measured', not of 'previous'"),
+        ({"name": "ewma"}, {"name": "ewma+close"}, "it is of 'ewma', not of 'ewma+close'"),
+        ({"name": "measured"}, {"name": "measured", "forgetting": 0.9}, "other parameters"),
+        ({"name": "edmd"}, {"name": "edmd", "edmd": EdmdParameters(prior=0.5)}, "other parameters"),
+        ({"name": "edmd"}, {"name": "edmd", "edmd": EdmdParameters(window=9)}, "other parameters"),
+        ({"name": "edmd"}, {"name": "edmd", "edmd": EdmdParameters(dictionary="identity")}, "other parameters"),
+        (
+            {"name": "formation"},
+            {"name": "formation", "closing": ClosingParameters(noise_m=(0.1,), level_m=(0.1,), trend_m=(0.1,))},
+            "finite numbers of shape (1, 2, 3) are expected",
+        ),
+    ],
+)
+def test_a_state_of_another_predictor_is_refused(learned, asked, said):
+    state = shown(learned, 5).state()
+    with pytest.raises(FormationError) as refused:
+        Predictor.from_state(PredictorParameters(**asked), state)
+    assert said in str(refused.value)

@@ -1,0 +1,59 @@
+"""Two runs on one machine never share a ROS domain."""
+
+import contextlib
+import socket
+
+import pytest
+
+from robot_formation.network import ros_domain
+from robot_formation.network.ros_domain import DOMAINS, DomainError, DomainReservation, domain_ports, free_domain
+
+# Ids that nobody uses: other tests and runs reserve theirs at the same time.
+UNUSED = range(228, 232)
+
+
+@pytest.fixture(autouse=True)
+def _own_domains(monkeypatch):
+    monkeypatch.setattr(ros_domain, "DOMAINS", UNUSED)
+
+
+def test_reservations_that_start_at_one_place_get_different_domains():
+    with DomainReservation(5) as first, DomainReservation(5) as second, DomainReservation(5) as third:
+        assert len({first, second, third}) == 3
+        assert {first, second, third} <= set(UNUSED)
+
+
+def test_a_domain_is_free_again_after_its_reservation():
+    with DomainReservation(5) as before:
+        pass
+    with DomainReservation(5) as after:
+        assert after == before
+
+
+def test_when_every_domain_is_taken_one_clear_line_says_so():
+    with contextlib.ExitStack() as taken:
+        assert {taken.enter_context(DomainReservation(7)) for _ in UNUSED} == set(UNUSED)
+        with pytest.raises(DomainError, match="no ROS domain from 228 to 231 is free"):
+            free_domain()
+    assert free_domain() in UNUSED
+
+
+def test_a_domain_whose_ports_are_used_is_passed_over():
+    wanted = free_domain()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as foreign:
+        foreign.bind(("127.0.0.1", domain_ports(wanted)[10]))
+        assert free_domain() != wanted
+
+
+def test_ports_of_neighbouring_domains_do_not_overlap():
+    assert domain_ports(0)[0] == 7400
+    assert all(domain_ports(n)[-1] + 1 == domain_ports(n + 1)[0] for n in DOMAINS)
+    assert domain_ports(DOMAINS[-1])[0] < 32768  # below the ports that Linux hands out
+
+
+def test_unreadable_tables_of_ports_do_not_stop_a_run(monkeypatch):
+    def refuse(*_arguments, **_keywords):
+        raise PermissionError
+
+    monkeypatch.setattr(ros_domain.Path, "read_text", refuse)
+    assert free_domain() in UNUSED

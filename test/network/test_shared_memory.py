@@ -1,0 +1,137 @@
+"""Shared memory of dead ROS processes is removed, that of living ones never."""
+
+import fcntl
+import importlib.util
+import mmap
+import os
+import subprocess
+import sys
+
+import pytest
+
+from robot_formation.network.ros_domain import DomainReservation
+from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, find_orphans
+
+NODE = """
+import rclpy
+rclpy.init()
+node = rclpy.create_node('shared_memory_test')
+print('up', flush=True)
+rclpy.spin(node)
+"""
+
+SEGMENT = "fastrtps_0123456789abcdef"
+
+
+def make(folder, *names):
+    for name in names:
+        (folder / name).touch()
+
+
+def lock(path):
+    descriptor = os.open(path, os.O_RDONLY)
+    fcntl.flock(descriptor, fcntl.LOCK_EX)
+    return descriptor
+
+
+def test_files_without_a_living_owner_are_removed(tmp_path):
+    names = {SEGMENT, f"{SEGMENT}_el", "fastrtps_port7413", "fastrtps_port7413_sl", "sem.fastrtps_port7413_mutex"}
+    make(tmp_path, *names)
+    assert set(clean_orphans(folder=tmp_path)) == names
+    assert not list(tmp_path.iterdir())
+
+
+def test_files_whose_owner_lives_stay(tmp_path):
+    make(tmp_path, SEGMENT, f"{SEGMENT}_el", "fastrtps_port7413", "fastrtps_port7413_el", "sem.fastrtps_port7413_mutex")
+    descriptor = lock(tmp_path / "fastrtps_port7413_el")
+    try:
+        assert find_orphans(folder=tmp_path) == {SEGMENT: [SEGMENT, f"{SEGMENT}_el"]}
+        assert clean_orphans(folder=tmp_path) == [SEGMENT, f"{SEGMENT}_el"]
+    finally:
+        os.close(descriptor)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_a_port_that_several_share_stays_while_one_of_them_lives(tmp_path):
+    make(tmp_path, "fastrtps_port7400", "fastrtps_port7400_sl")
+    descriptor = os.open(tmp_path / "fastrtps_port7400_sl", os.O_RDONLY)
+    fcntl.flock(descriptor, fcntl.LOCK_SH)
+    try:
+        assert clean_orphans(folder=tmp_path) == []
+    finally:
+        os.close(descriptor)
+
+
+def test_a_lock_file_that_is_open_but_not_yet_locked_counts_as_alive(tmp_path):
+    make(tmp_path, SEGMENT, f"{SEGMENT}_el")
+    with open(tmp_path / f"{SEGMENT}_el"):
+        assert clean_orphans(folder=tmp_path) == []
+    assert clean_orphans(folder=tmp_path) == [SEGMENT, f"{SEGMENT}_el"]
+
+
+def test_a_port_without_lock_file_is_removed_unless_somebody_has_it_mapped(tmp_path):
+    port = "fastrtps_port7413"
+    make(tmp_path, port)
+    (tmp_path / port).write_bytes(b"x")
+    with open(tmp_path / port, "r+b") as file, mmap.mmap(file.fileno(), 0):
+        file.close()
+        assert clean_orphans(folder=tmp_path) == []
+    assert clean_orphans(folder=tmp_path) == [port]
+
+
+def test_foreign_files_stay(tmp_path):
+    make(tmp_path, "fastrtps_port", "fastrtps_xyz_el", "somebody_elses", "lttng")
+    assert clean_orphans(folder=tmp_path) == []
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_cleaning_one_domain_leaves_the_ports_of_others(tmp_path):
+    ports = {"mine": 7400 + 250 * 3 + 11, "other": 7400 + 250 * 4, "any": 7000}
+    make(tmp_path, *(f"fastrtps_port{port}_el" for port in ports.values()))
+    assert set(clean_orphans(3, tmp_path)) == {f"fastrtps_port{ports['mine']}_el", f"fastrtps_port{ports['any']}_el"}
+
+
+def test_a_missing_folder_is_no_error(tmp_path):
+    assert clean_orphans(folder=tmp_path / "nowhere") == []
+
+
+@pytest.mark.graph
+@pytest.mark.xdist_group("experiment_shared_memory")
+def test_a_killed_node_leaves_files_that_are_removed_and_a_living_one_keeps_its_own():
+    if importlib.util.find_spec("rclpy") is None:
+        pytest.skip("ROS is not installed")
+    with DomainReservation() as domain:
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+
+        def start():
+            node = subprocess.Popen([sys.executable, "-c", NODE], env=environment, stdout=subprocess.PIPE)
+            assert node.stdout.readline() == b"up\n"
+            return node
+
+        def files_of(node):
+            opened = {os.path.realpath(entry) for entry in os.scandir(f"/proc/{node.pid}/fd")}
+            groups = {path.removeprefix("/dev/shm/").removesuffix("_el") for path in opened if path.endswith("_el")}
+            return {name for group, names in fast_dds_files().items() if group in groups for name in names}
+
+        living, doomed = start(), start()
+        try:
+            kept, left = files_of(living), files_of(doomed)
+            assert kept
+            assert left
+            assert kept.isdisjoint(left)
+            assert not (kept | left) & set(clean_orphans(domain))
+            doomed.kill()
+            doomed.wait()
+            clean_orphans(domain)
+            assert kept <= set(os.listdir("/dev/shm"))
+            # The living node may have the dead one's files mapped, so only now must they go.
+            living.kill()
+            living.wait()
+            clean_orphans(domain)  # or another run's: ports 7000 and up are shared by all domains
+            assert not {name for name in kept | left if "port70" not in name} & set(os.listdir("/dev/shm"))
+        finally:
+            for node in (living, doomed):
+                node.kill()
+                node.wait()
+                node.stdout.close()
+            clean_orphans(domain)

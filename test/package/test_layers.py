@@ -1,0 +1,124 @@
+"""Imports run downward only, and each outside library has its one place."""
+
+import ast
+import re
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+from repository import PACKAGE
+
+# From the bottom to the top, in a strict order: a part imports those before it only.
+LAYERS = [
+    ("errors", "exit_codes", "names", "parameters", "paths", ""),
+    *((room,) for room in ("system", "network", "batch", "geometry", "koopman", "surface", "bag", "vision", "world")),
+    *((room,) for room in ("drive", "leader", "alignment", "follower", "analysis", "conversions", "components")),
+    *((room,) for room in ("calibration", "experiment", "nodes", "launching", "cli")),
+]
+LEVEL = {area: level for level, areas in enumerate(LAYERS) for area in areas}
+ROS = re.compile(
+    r"rclpy|rcl_interfaces|rosidl\w*|\w+_msgs|\w+_srvs|builtin_interfaces|ament_index_python|launch(_ros)?"
+)
+
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+
+def area_of(module: str) -> str:
+    """The part of the package that a module lies in; empty for the package itself."""
+    return module.split(".")[1] if "." in module else ""
+
+
+def name_of(file: Path) -> str:
+    parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def exists(module: str) -> bool:
+    path = PACKAGE.parent.joinpath(*module.split("."))
+    return path.with_suffix(".py").is_file() or (path / "__init__.py").is_file()
+
+
+def imports(file: Path) -> Iterator[str]:
+    """Every module that a file imports, wherever in it, as an absolute name."""
+    package = file.parent.relative_to(PACKAGE.parent).parts
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            for alias in node.names:
+                inner = f"{module}.{alias.name}"
+                yield inner if module.startswith("robot_formation") and exists(inner) else module
+
+
+def imports_for_types(file: Path) -> Iterator[str]:
+    """The modules that a file imports for its annotations only."""
+    tree = ast.parse(file.read_text())
+    blocks = [node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    for node in (inner for block in blocks for inner in block.body if isinstance(inner, ast.ImportFrom)):
+        for alias in node.names:
+            name = f"{node.module}.{alias.name}"
+            yield name if exists(name) else str(node.module)
+
+
+GRAPH = {name_of(file): set(imports(file)) for file in FILES}
+OWN = {module: {name for name in found if name.split(".")[0] == "robot_formation"} for module, found in GRAPH.items()}
+
+
+RUNTIME = {name_of(file): OWN[name_of(file)] - set(imports_for_types(file)) for file in FILES}
+
+
+def reachable(module: str) -> set[str]:
+    """A module and all of the package's modules that importing it imports, directly or not."""
+    seen: set[str] = set()
+    todo = [module]
+    while todo:
+        current = todo.pop()
+        if current not in seen:
+            seen.add(current)
+            todo += OWN.get(current, ())
+    return seen
+
+
+def test_every_part_of_the_package_has_its_layer():
+    assert {area_of(module) for module in GRAPH} <= set(LEVEL)
+
+
+def test_imports_run_downward_only():
+    pairs = {(module, name) for module, names in OWN.items() for name in names}
+    assert not {(module, name) for module, name in pairs if LEVEL[area_of(name)] > LEVEL[area_of(module)]}
+
+
+def test_no_modules_import_each_other_in_a_circle_lazily_or_not():
+    graph = {module: {name for name in names if name in OWN} for module, names in RUNTIME.items()}
+    try:
+        list(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
+
+
+def test_only_nodes_and_conversions_import_ros():
+    importers = {module for module, names in GRAPH.items() if any(ROS.fullmatch(n.split(".")[0]) for n in names)}
+    assert {area_of(module) for module in importers} <= {"nodes", "conversions"}
+
+
+def test_only_the_world_imports_pybullet():
+    importers = {module for module, names in GRAPH.items() if any(n.split(".")[0] == "pybullet" for n in names)}
+    assert {area_of(module) for module in importers} <= {"world"}
+
+
+def test_yaml_is_parsed_in_one_place():
+    parses = re.compile(r"\byaml\.(\w*load\w*|parse|scan|compose\w*|\w*Loader)\b")
+    files = [*FILES, *(PACKAGE.parent / "launch").glob("*.py")]
+    assert {file.name for file in files if parses.search(file.read_text())} == {"yaml_files.py"}
+
+
+@pytest.mark.parametrize("area", [room for (room,) in LAYERS[1 : LAYERS.index(("conversions",))]])
+def test_these_parts_need_no_ros_not_even_indirectly(area):
+    modules = [module for module in GRAPH if area_of(module) == area]
+    assert modules
+    for module in modules:
+        assert not [name for name in reachable(module) if area_of(name) in {"nodes", "conversions"}]

@@ -1,0 +1,79 @@
+"""Handlers of the signals that ask to end: an ignored SIGHUP stays ignored, everywhere; afterwards all is as before."""
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from graph_tools import short_scenario
+from robot_formation.launching.launcher import Launcher
+from robot_formation.nodes.host.session import Interrupts
+from robot_formation.system.signal_handling import ENDING, give_back, take
+
+NODE = """
+import signal, sys
+from robot_formation.nodes.host.signals import stop_on_signals, stopped
+stop_on_signals()
+signal.raise_signal(signal.SIGHUP)
+hung_up = stopped()
+signal.raise_signal(signal.SIGTERM)
+print(hung_up, stopped())
+"""
+
+
+def ignore_hangup():
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+
+@pytest.fixture
+def handlers():
+    before = {number: signal.getsignal(number) for number in ENDING}
+    yield before
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def test_the_handlers_before_come_back(handlers):
+    came = []
+    previous = take(lambda number, frame: came.append(number))
+    for number in ENDING:
+        signal.raise_signal(number)
+    give_back(previous)
+    assert came == list(ENDING)
+    assert {number: signal.getsignal(number) for number in ENDING} == handlers
+
+
+def test_an_ignored_hangup_stays_ignored(handlers):
+    ignore_hangup()
+    came = []
+    previous = take(lambda number, frame: came.append(number))
+    signal.raise_signal(signal.SIGHUP)
+    assert came == []
+    give_back(previous)
+    assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+
+
+@pytest.mark.parametrize("ignored", [True, False])
+def test_a_launcher_and_a_verb_with_a_node_count_a_hangup_unless_it_is_ignored(handlers, ignored):
+    if ignored:
+        ignore_hangup()
+    launcher = Launcher(short_scenario(), None)
+    with launcher._signals():
+        signal.raise_signal(signal.SIGHUP)
+        assert launcher._interrupted == (0 if ignored else 1)
+    with Interrupts() as interrupts:
+        signal.raise_signal(signal.SIGHUP)
+        assert interrupts() is not ignored
+
+
+@pytest.mark.parametrize(("ignored", "printed"), [(True, "False True"), (False, "True True")])
+def test_a_node_counts_a_hangup_unless_it_is_ignored(ignored, printed):
+    completed = subprocess.run(
+        [sys.executable, "-c", NODE],
+        preexec_fn=ignore_hangup if ignored else None,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert completed.stdout.strip() == printed

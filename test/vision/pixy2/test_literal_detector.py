@@ -1,0 +1,45 @@
+"""The fast detector agrees with the slow, literal reading of the rules on a thousand random pictures."""
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robot_formation.vision.pixy2.color_table import ColorTable
+from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.parameters import DetectorParameters
+from vision_helpers import GROUPS, PARAMETERS, random_picture
+from vision_literal import LiteralDetector
+
+SETTINGS = {
+    "default": DetectorParameters(),
+    "paper": replace(PARAMETERS["paper"], signature_range=(5.0, 6.0, 6.0)),
+    "wide and few": DetectorParameters(
+        signature_range=(15.0, 20.0, 25.0), min_block_area=4, max_merge_dist=0, max_blocks=9, max_blocks_per_signature=4
+    ),
+}
+
+
+@functools.cache
+def pair(name):
+    return BlockDetector(GROUPS["G1"], SETTINGS[name]), LiteralDetector(GROUPS["G1"], SETTINGS[name])
+
+
+@pytest.mark.parametrize("part", range(12))
+@pytest.mark.parametrize("name", SETTINGS)
+def test_random_pictures_give_the_segments_and_boxes_of_the_literal_reading(name, part):
+    fast, literal = pair(name)
+    for seed in range(28 * part, 28 * (part + 1)):
+        image = random_picture(np.random.default_rng(seed))
+        assert fast.row_segments(image) == literal.row_segments(image), f"segments, seed {seed}"
+        boxes = [(box.signature, box.left, box.right, box.top, box.bottom) for box in fast.detect(image)]
+        assert boxes == literal.detect(image), f"boxes, seed {seed}"
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_the_color_table_is_that_of_the_literal_reading(name):
+    _, literal = pair(name)
+    labels = ColorTable.of(GROUPS["G1"], SETTINGS[name]).labels.reshape(64, 256)[:, :64]
+    shifted = [[literal.table[64 * ((iu - 32) & 63) + ((iv - 32) & 63)] for iv in range(64)] for iu in range(64)]
+    assert labels.tolist() == shifted

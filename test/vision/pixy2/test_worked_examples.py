@@ -1,0 +1,59 @@
+"""Every worked example agrees exactly; only the order among blocks of equal area is free."""
+
+from dataclasses import asdict, replace
+
+import pytest
+
+from robot_formation.vision.pixy2.color_table import run_time_bounds
+from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.signatures import teach_point, teach_region
+from vision_helpers import EXAMPLES, GROUPS, PARAMETERS, picture
+
+
+def by_area(blocks):
+    return sorted(blocks, key=lambda block: (-block["width"] * block["height"], sorted(block.items())))
+
+
+def label(example):
+    return f"{example['image']}-{example.get('sig', '')}-{example.get('grow_dist', '')}"
+
+
+@pytest.mark.parametrize("example", EXAMPLES["teach"], ids=label)
+def test_teaching_stores_the_bounds_and_accepts_the_blocks_of_the_example(example):
+    image = picture(example["image"])
+    if example["kind"] == "region":
+        signature = teach_region(image, example["region"], example["sig"])
+        gain = PARAMETERS["paper"].range_of(signature.sig)
+        assert run_time_bounds(signature, gain) == tuple(example["runtime_paper"].values())
+    else:
+        point = tuple(example["point"])
+        signature, blocks = teach_point(image, point, example["grow_dist"], example["sig"])
+        assert [list(block) for block in blocks] == example["points"]
+    assert signature.to_mapping() == example["result"]
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+@pytest.mark.parametrize("example", EXAMPLES["images"], ids=label)
+def test_a_picture_shown_twice_gives_the_blocks_of_the_example(example, name):
+    detector = BlockDetector(GROUPS[example["group"]], replace(PARAMETERS[name], block_filtering=0))
+    image = picture(example["image"])
+    assert detector.process(image, 0) == []
+    blocks = [asdict(block) for block in detector.process(image, 16_200)]
+    assert by_area(blocks) == by_area(example["expected"][name])
+
+
+@pytest.mark.parametrize("example", EXAMPLES["images"], ids=label)
+def test_row_segments_are_those_of_the_example(example):
+    detector = BlockDetector(GROUPS[example["group"]], PARAMETERS["paper"])
+    segments = detector.row_segments(picture(example["image"]))
+    assert [list(segment) for segment in segments] == example["row_segments_paper"]
+
+
+@pytest.mark.parametrize("sequence", EXAMPLES["sequences"], ids=lambda sequence: sequence["name"])
+def test_a_sequence_is_tracked_with_the_index_and_age_of_the_example(sequence):
+    detector = BlockDetector(GROUPS[sequence["group"]], PARAMETERS[sequence["params"]])
+    time_us = 1_700_000_000_000_000
+    for number, frame in enumerate(sequence["frames"]):
+        time_us += frame["dt_us"] if number else 0
+        blocks = [asdict(block) for block in detector.process(picture(frame["image"]), time_us)]
+        assert by_area(blocks) == by_area(frame["expected"]), f"frame {number}"
