@@ -12,15 +12,16 @@ import math
 import re
 import types
 import typing
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any, TypeVar
 
 from robot_formation.errors import FormationError, shown
 
 T = TypeVar("T")
 
-_ELEMENTS: dict[Any, type] = {
+_ELEMENTS: dict[object, type] = {
     tuple[float, ...]: float,
     tuple[int, ...]: int,
     tuple[str, ...]: str,
@@ -29,6 +30,13 @@ _ELEMENTS: dict[Any, type] = {
 _LONGEST_NAME = 100
 _LISTED = 240  # characters
 _EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
+
+
+class Choice(str, Enum):
+    """Base of parameters that take one of some words; a member equals its word, which YAML, ROS and JSON hold."""
+
+    def __str__(self) -> str:
+        return str(self.value)
 
 
 class ParameterError(FormationError):
@@ -54,18 +62,24 @@ The namespace was absolute and is relative to that of the robots by default; and
 class Spec:
     """One parameter: dotted name, Python type, default, unit, closed range or choices, description.
 
-    `known` lists names that it can have where whoever uses them looks them up, and complains.
+    `known` lists names that it can have where whoever uses them looks them up, and complains. Where the field's type is
+    a `Choice`, `choice` is that class, and type, default and choices are those of its words.
     """
 
     name: str
-    type: Any
+    type: object
     default: Any
     unit: str
     low: float | None
     high: float | None
-    choices: tuple[Any, ...]
+    choices: tuple[object, ...]
     description: str
     known: tuple[str, ...] = ()
+    choice: Callable[[object], Choice] | None = None
+
+    def plain_default(self) -> Any:
+        """Return the default as YAML, ROS and JSON hold it: a list for a tuple."""
+        return list(self.default) if isinstance(self.default, tuple) else self.default
 
 
 def parameter(
@@ -75,7 +89,7 @@ def parameter(
     unit: str = "",
     low: float | None = None,
     high: float | None = None,
-    choices: tuple[Any, ...] = (),
+    choices: tuple[object, ...] = (),
     known: tuple[str, ...] = (),
 ) -> Any:
     """Make a dataclass field that carries what `Spec` lists: unit, closed range [low, high] or choices, description."""
@@ -83,7 +97,7 @@ def parameter(
     return dataclasses.field(default=default, metadata=metadata)
 
 
-def specs(cls: type, prefix: str = "", *, defaults: Any = None) -> dict[str, Spec]:
+def specs(cls: type, prefix: str = "", *, defaults: object = None) -> dict[str, Spec]:
     """List the parameters of a dataclass by dotted name, nested dataclasses included.
 
     Args:
@@ -103,18 +117,24 @@ def specs(cls: type, prefix: str = "", *, defaults: Any = None) -> dict[str, Spe
             continue
         meta = field.metadata
         default = field.default if defaults is None else getattr(defaults, field.name)
+        choice = kind if isinstance(kind, type) and issubclass(kind, Choice) else None
         found[name] = Spec(
             name,
-            kind,
-            default,
+            str if choice else kind,
+            _plain(default),
             meta["unit"],
             meta["low"],
             meta["high"],
-            tuple(meta["choices"]),
+            tuple(member.value for member in choice) if choice else tuple(meta["choices"]),
             meta["description"],
             tuple(meta["known"]),
+            choice,
         )
     return found
+
+
+def _plain(value: object) -> object:
+    return value.value if isinstance(value, Choice) else value
 
 
 def todays_names(values: Mapping[str, T], *, where: str = "parameters") -> dict[str, T]:
@@ -139,13 +159,13 @@ def no_parameter(name: str, known: Collection[str]) -> str:
     return f"no parameter '{name}'{hint}"
 
 
-def flatten(values: Mapping[str, Any], prefix: str = "", *, where: str = "parameters") -> dict[str, Any]:
+def flatten(values: Mapping[str, object], prefix: str = "", *, where: str = "parameters") -> dict[str, object]:
     """Turn nested mappings into one with dotted names, today's; `where` they stand is for messages.
 
     Raises:
         ParameterError: if a name is given twice, nested and with dots.
     """
-    flat: dict[str, Any] = {}
+    flat: dict[str, object] = {}
     for key, value in values.items():
         inner = (
             flatten(value, f"{prefix}{key}.", where=where) if isinstance(value, Mapping) else {f"{prefix}{key}": value}
@@ -161,18 +181,18 @@ def flatten(values: Mapping[str, Any], prefix: str = "", *, where: str = "parame
 
 
 def to_mapping(instance: Any, prefix: str = "") -> dict[str, Any]:
-    """Turn a parameter object into a mapping of dotted names to plain values (tuples become lists)."""
+    """Turn a parameter object into a mapping of dotted names to plain values: lists for tuples, words for choices."""
     values: dict[str, Any] = {}
     for field in dataclasses.fields(instance):
         value = getattr(instance, field.name)
         if dataclasses.is_dataclass(value):
             values.update(to_mapping(value, f"{prefix}{field.name}."))
         else:
-            values[prefix + field.name] = list(value) if isinstance(value, tuple) else value
+            values[prefix + field.name] = list(value) if isinstance(value, tuple) else _plain(value)
     return values
 
 
-def from_mapping(cls: type[T], values: Mapping[str, Any], *, where: str) -> T:
+def from_mapping(cls: type[T], values: Mapping[str, object], *, where: str) -> T:
     """Build and check a parameter object from nested or dotted names.
 
     Args:
@@ -191,7 +211,7 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], *, where: str) -> T:
     return _build(cls, {name: check(known[name], value, where=where) for name, value in flat.items()})
 
 
-def suggestion(name: str, known: typing.Iterable[str]) -> str:
+def suggestion(name: str, known: Iterable[str]) -> str:
     """Say which known name was probably meant, whatever its case, or list what there is."""
     candidates = list(known)
     name = name[:_LONGEST_NAME]  # finding what is near takes the square of the length
@@ -213,19 +233,19 @@ def _listed(candidates: list[str]) -> str:
     return ", ".join(listed) + (f" and {rest} more" if rest else "")
 
 
-def check(spec: Spec, value: Any, *, where: str) -> Any:
+def check(spec: Spec, value: object, *, where: str) -> object:
     """Return the value in the parameter's type, or raise ParameterError."""
     return check_as(spec, value, f"{where}: '{spec.name}'")
 
 
-def check_as(spec: Spec, value: Any, subject: str) -> Any:
+def check_as(spec: Spec, value: object, subject: str) -> object:
     """Return the value in the parameter's type; errors begin with the subject, like an option of the command line.
 
     Raises:
         ParameterError: on a wrong type, or a value outside the range or the choices.
     """
     if spec.type in _ELEMENTS:
-        if isinstance(value, (str, bytes)) or not hasattr(value, "__iter__"):
+        if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
             raise ParameterError(f"{subject} must be a list, not {shown(value)}")
         items = tuple(_check_one(spec, _ELEMENTS[spec.type], item, subject) for item in value)
         if spec.default and not items:
@@ -234,10 +254,11 @@ def check_as(spec: Spec, value: Any, subject: str) -> Any:
     kind = spec.type
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
         raise TypeError(f"{spec.name}: optional parameters are not supported; use a neutral default")
-    return _check_one(spec, kind, value, subject)
+    checked = _check_one(spec, typing.cast(type, kind), _plain(value), subject)
+    return spec.choice(checked) if spec.choice else checked
 
 
-def _check_one(spec: Spec, kind: type, value: Any, subject: str) -> Any:
+def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:
     wrong = ParameterError(f"{subject} must be of type {kind.__name__}, not {shown(value)}")
     if kind is float and isinstance(value, str) and _EXPONENT.fullmatch(value):
         value = float(value)  # YAML 1.1 takes 1e3, without a dot, for text
@@ -259,13 +280,14 @@ def _check_one(spec: Spec, kind: type, value: Any, subject: str) -> Any:
         hint = suggestion(str(value), [str(c) for c in spec.choices])
         raise ParameterError(f"{subject} can't be {shown(value)}{hint}")
     low, high = spec.low, spec.high
-    if (low is not None and value < low) or (high is not None and value > high):
+    number = value if isinstance(value, (int, float)) else 0.0
+    if (low is not None and number < low) or (high is not None and number > high):
         limits = f"{'-inf' if low is None else low} to {'inf' if high is None else high} {spec.unit}".rstrip()
         raise ParameterError(f"{subject} is {shown(value)}, outside {limits}")
     return value
 
 
-def _build(cls: type[T], flat: Mapping[str, Any], prefix: str = "", defaults: Any = None) -> T:
+def _build(cls: type[T], flat: Mapping[str, object], prefix: str = "", defaults: object = None) -> T:
     hints = typing.get_type_hints(cls)
     arguments: dict[str, Any] = {}
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]

@@ -17,10 +17,8 @@ from robot_formation.batch.pool import run_parallel
 from robot_formation.calibration.alignment_trial import FOLLOWER
 from robot_formation.calibration.camera_grid import Conditions, Position, measure, stand
 from robot_formation.calibration.camera_samples import CameraSample
-from robot_formation.components.catalogue import KINDS
 from robot_formation.drive.curves import CalibrationError
-from robot_formation.experiment.scenario import Scenario
-from robot_formation.parameters import from_mapping
+from robot_formation.parameters import to_mapping
 from robot_formation.world import Pose
 from robot_formation.world.description import robot_description
 
@@ -28,35 +26,19 @@ BAG_NAME = "vision_bag"
 _NS = 10**9
 
 
-def conditions_of(scenario: Scenario) -> Conditions:
-    """Take the looks' conditions out of a scenario.
-
-    Raises:
-        FormationError: on a wrong parameter, or signatures that can't be read.
-    """
-    world, detector, tuner = (
-        from_mapping(KINDS[kind].parameter_class(), scenario.parameters(kind), where=kind)
-        for kind in ("world", "block_detector", "fine_tuner")
-    )
-    detector.load()
-    return Conditions(world, detector, tuner.look, scenario.setup.seed)
+# What the looks' results depend on, of the world's parameters.
+_WORLD = ("surface", "chassis.", "wheels.", "camera.", "marker.")
 
 
-def record_of(scenario: Scenario, step_m: float) -> dict[str, Any]:
+def record_of(conditions: Conditions, step_m: float) -> dict[str, object]:
     """List by name all that the looks' results depend on."""
-    found: dict[str, Any] = {"step_m": step_m, "seed": scenario.setup.seed}
-    for kind, parts in _RELEVANT.items():
-        found.update(
-            {f"{kind}.{name}": value for name, value in scenario.parameters(kind).items() if name.startswith(parts)}
-        )
-    return found
-
-
-_RELEVANT = {
-    "world": ("surface", "chassis.", "wheels.", "camera.", "marker."),
-    "block_detector": ("",),
-    "fine_tuner": ("look.",),
-}
+    return {
+        "step_m": step_m,
+        "seed": conditions.seed,
+        **{f"world.{name}": value for name, value in to_mapping(conditions.world).items() if name.startswith(_WORLD)},
+        **to_mapping(conditions.detector, "block_detector."),
+        **to_mapping(conditions.look, "fine_tuner.look."),
+    }
 
 
 def carry_out(positions: Iterable[Position], conditions: Conditions, jobs: int) -> Iterator[list[CameraSample]]:

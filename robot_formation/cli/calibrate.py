@@ -103,15 +103,12 @@ def run_motors(args: argparse.Namespace) -> int:
     from robot_formation.calibration.motor_moves import calibrate_motors, curves
     from robot_formation.calibration.motor_report import motors_json, motors_text
     from robot_formation.drive.curves import MotorCalibration, save_calibration
-    from robot_formation.drive.movement_system import DriveParameters
-    from robot_formation.parameters import from_mapping
 
     scenario = build_scenario(args, with_curves=False)
     folder = free_folder(args, scenario, (CALIBRATION_FILE, MOTORS_PICTURE))
-    drive = from_mapping(DriveParameters, scenario.parameters("drive"), where="drive")
     rig = make_rig(args, scenario)
-    fits = calibrate_motors(rig, scenario.robots, drive, args.repeats, _say)
-    conditions = {**_conditions(args, scenario), **robot_facts(scenario)}
+    fits = calibrate_motors(rig, scenario.robots, scenario.drive, args.repeats, _say)
+    conditions = {**_conditions(args, scenario), **robot_facts(scenario.drive, scenario.world)}
     save_calibration(folder / CALIBRATION_FILE, MotorCalibration(curves(fits).robots, conditions))
     picture = draw_motors(fits, f"Motor calibration · {_told(args, scenario)}", folder / MOTORS_PICTURE)
     if args.json:
@@ -136,22 +133,20 @@ def run_encoders(args: argparse.Namespace) -> int:
     from robot_formation.calibration.encoder_moves import measure_encoders
     from robot_formation.calibration.motor_figures import draw_encoders
     from robot_formation.calibration.motor_report import encoders_json, encoders_text
-    from robot_formation.drive.movement_system import DriveParameters
-    from robot_formation.parameters import from_mapping, suggestion
+    from robot_formation.parameters import suggestion
 
     scenario = build_scenario(args, with_curves=True)
     if args.robot not in scenario.robots:
         raise FormationError(f"the scenario has no robot '{args.robot}'{suggestion(args.robot, scenario.robots)}")
     folder = free_folder(args, scenario, (ENCODERS_PICTURE,))
-    drive = from_mapping(DriveParameters, scenario.parameters("drive"), where="drive")
-    _say(describe_curves(scenario))
+    _say(describe_curves(scenario.drive))
     rig = make_rig(args, scenario)
-    comparisons = compare_distances(measure_encoders(rig, args.robot, drive, args.repeats, _say))
+    comparisons = compare_distances(measure_encoders(rig, args.robot, scenario.drive, args.repeats, _say))
     title = f"{args.robot.replace('_', ' ')}, travelled distances · {_told(args, scenario)}"
     picture = draw_encoders(comparisons, title, folder / ENCODERS_PICTURE)
     if args.json:
         said = {"robot": args.robot, **_conditions(args, scenario), "picture": str(picture)}
-        said["calibration_file"] = drive.calibration_file or None
+        said["calibration_file"] = scenario.drive.calibration_file or None
         print(json.dumps({**said, "distances": encoders_json(comparisons)}, indent=2, allow_nan=False))
         return 0
     print(f"{args.robot}: {_told(args, scenario)}\n\n{encoders_text(comparisons)}\n\npicture: {picture}")
@@ -161,25 +156,22 @@ def run_encoders(args: argparse.Namespace) -> int:
 def make_rig(args: argparse.Namespace, scenario: Scenario) -> CalibrationRig:
     """Make the calibration rig of the scenario's ground and robots."""
     from robot_formation.calibration.rig import CalibrationRig
-    from robot_formation.components.catalogue import KINDS
-    from robot_formation.parameters import from_mapping
 
-    world = from_mapping(KINDS["world"].parameter_class(), scenario.parameters("world"), where="world")
-    return CalibrationRig(world.make_surface(), world, scenario.setup.seed, args.reference_noise)
+    return CalibrationRig(scenario.world.make_surface(), scenario.world, scenario.setup.seed, args.reference_noise)
 
 
 def _conditions(args: argparse.Namespace, scenario: Scenario) -> dict[str, Any]:
     return {
         "scenario": scenario.setup.name,
         "seed": scenario.setup.seed,
-        "surface": scenario.parameters("world")["surface"],
+        "surface": scenario.world.surface,
         "repeats": args.repeats,
         "reference_noise_m": args.reference_noise,
     }
 
 
 def _told(args: argparse.Namespace, scenario: Scenario) -> str:
-    said = [f"seed {scenario.setup.seed}", scenario.parameters("world")["surface"], f"{args.repeats} times each way"]
+    said = [f"seed {scenario.setup.seed}", scenario.world.surface, f"{args.repeats} times each way"]
     said += [f"reference noise {args.reference_noise * 1e3:g} mm"] if args.reference_noise else []
     return ", ".join(said)
 

@@ -51,7 +51,7 @@ def run_vision(args: argparse.Namespace) -> int:
         FormationError: on anything wrong in the arguments or the folder, or if the curves can't be fitted.
     """
     from robot_formation.calibration.camera_grid import positions
-    from robot_formation.calibration.camera_run import BAG_NAME, conditions_of, record_of
+    from robot_formation.calibration.camera_run import BAG_NAME, record_of
     from robot_formation.calibration.camera_table import RECORD_NAME, TABLE_NAME, VisionTable
 
     if args.jobs < 1:
@@ -62,7 +62,7 @@ def run_vision(args: argparse.Namespace) -> int:
     folder = output_folder(args, scenario)
     if args.force:
         _clear(folder, (RECORD_NAME, TABLE_NAME, CALIBRATION_FILE, *PICTURES.values(), BAG_NAME))
-    table = VisionTable(folder, record_of(scenario, args.step), places)
+    table = VisionTable(folder, record_of(conditions, args.step), places)
     try:
         _look(table, places, conditions, args.jobs)
         result = _evaluate(scenario, conditions, table.all(places), folder, args.step)
@@ -105,7 +105,7 @@ def _evaluate(
     bag = folder / BAG_NAME
     if not bag.exists():
         shutil.rmtree(bag.with_name(BAG_NAME + PARTIAL_SUFFIX), ignore_errors=True)  # of a run that was stopped
-        metadata = {"calibration": "vision", "conditions": json.dumps(record_of(scenario, step_m))}
+        metadata = {"calibration": "vision", "conditions": json.dumps(record_of(conditions, step_m))}
         write_bag(bag, samples, conditions, metadata)
     world, told = conditions.world, _told(scenario)
     edge = world.marker.edge_m
@@ -114,11 +114,11 @@ def _evaluate(
     views = face_views(samples)
     edges = edge_biases((sample, true_faces(world, sample)) for sample in samples if sample.blocks)
     result = VisionResult(samples, views, fit_camera(views, edge), edges)
-    measured_with = {"seed": scenario.setup.seed, "surface": world.surface, "step_m": step_m, **camera_facts(scenario)}
+    measured_with = {"seed": scenario.setup.seed, "surface": world.surface, "step_m": step_m, **camera_facts(world)}
     save_vision(folder / CALIBRATION_FILE, VisionCalibration(result.fit.alignment(), measured_with))
     distances, compared = result.distances()
     draw_pan(result.fit, views, distances, compared, f"Pan curves · {told}", folder / PICTURES["pan"])
-    tolerance = scenario.parameters("fine_tuner")["alignment.u_tolerance_m"]
+    tolerance = scenario.fine_tuner.alignment.u_tolerance_m
     draw_side(result.fit, views, tolerance, f"Side length beside the neighbour · {told}", folder / PICTURES["side"])
     return result
 
@@ -134,7 +134,7 @@ def _print(args: argparse.Namespace, scenario: Scenario, result: VisionResult, f
         said = {
             "scenario": scenario.setup.name,
             "seed": scenario.setup.seed,
-            "surface": scenario.parameters("world")["surface"],
+            "surface": scenario.world.surface,
             "step_m": args.step,
             **{name: str(path) for name, path in files.items()},
             "pictures": pictures,
@@ -147,6 +147,18 @@ def _print(args: argparse.Namespace, scenario: Scenario, result: VisionResult, f
     print(f"to use it: formation run --set fine_tuner.calibration_file={files['file']}")
 
 
+def conditions_of(scenario: Scenario) -> Conditions:
+    """Take the looks' conditions out of a scenario.
+
+    Raises:
+        SignatureError: the taught signatures can't be read.
+    """
+    from robot_formation.calibration.camera_grid import Conditions
+
+    scenario.block_detector.load()
+    return Conditions(scenario.world, scenario.block_detector, scenario.fine_tuner.look, scenario.setup.seed)
+
+
 def _clear(folder: Path, names: tuple[str, ...]) -> None:
     for name in names:
         path = folder / name
@@ -157,4 +169,4 @@ def _clear(folder: Path, names: tuple[str, ...]) -> None:
 
 
 def _told(scenario: Scenario) -> str:
-    return f"seed {scenario.setup.seed}, {scenario.parameters('world')['surface']}"
+    return f"seed {scenario.setup.seed}, {scenario.world.surface}"

@@ -52,11 +52,11 @@ def collect() -> dict[str, dict[str, str]]:
     tracks = {}
     for name in scenario.track_names():
         loaded = scenario.load_track(name)
-        setup, leader = loaded.setup, loaded.parameters("leader")
+        setup, leader = loaded.setup, loaded.leader
         tracks[name] = (
             f"leader from ({setup.start_x_m * 100:.1f}, {setup.start_y_m * 100:.1f}) cm, "
             f"heading {setup.heading_deg:g} deg, "
-            f"{leader['timesteps']} timesteps of {leader['step_m'] * 100:g} cm"
+            f"{leader.timesteps} timesteps of {leader.step_m * 100:g} cm"
         )
     return {
         "tracks": tracks,

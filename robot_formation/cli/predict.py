@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -110,24 +111,20 @@ def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[Predictor
     Raises:
         FormationError: naming what is misspelt, out of range or of another node.
     """
-    from robot_formation.experiment.scenario import Scenario, Setup, override
-    from robot_formation.koopman.predictors import NAMES, PredictorParameters
-    from robot_formation.parameters import from_mapping, suggestion
+    from robot_formation.experiment.scenario import Setup, build, override
+    from robot_formation.koopman.predictors import NAMES
+    from robot_formation.parameters import suggestion
 
     for name in chosen:
         if name not in NAMES:
             raise FormationError(f"--predictors: no predictor '{name}'{suggestion(name, NAMES)}")
-    scenario = override(Scenario(Setup(), {}), settings)
+    scenario = override(build(Setup(), {}), settings)
     for setting in settings:
         if not setting.startswith("predictor."):
             raise FormationError(f"--set {setting}: a log has no scenario; set parameters like predictor.forgetting")
-    if "name" in scenario.sections.get("predictor", {}):
+    if "name" in scenario.settings.get("predictor", {}):
         raise FormationError("--set predictor.name: name predictors by --predictors NAME,...")
-    values = scenario.parameters("predictor")
-    return [
-        from_mapping(PredictorParameters, {**values, "name": name}, where="predictor")
-        for name in dict.fromkeys(chosen or NAMES)
-    ]
+    return [replace(scenario.predictor, name=name) for name in dict.fromkeys(chosen or NAMES)]
 
 
 def read(args: argparse.Namespace) -> DisplacementLog:

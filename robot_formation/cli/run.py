@@ -139,8 +139,7 @@ def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
 
     if args.bag is not None:
         return PathReservation(args.bag)
-    predictor = scenario.parameters("predictor")["name"]
-    stem = f"{scenario.setup.name}_{predictor}_seed{scenario.setup.seed}_{time.strftime('%Y%m%d-%H%M%S')}"
+    stem = f"{scenario.setup.name}_{scenario.predictor.name}_seed{scenario.setup.seed}_{time.strftime('%Y%m%d-%H%M%S')}"
     return reserve_new(default_bags_dir(), re.sub(r"[^\w.-]", "_", stem))
 
 
@@ -152,14 +151,14 @@ def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    say(describe_curves(scenario))
-    if camera := describe_camera(scenario):
+    say(describe_curves(scenario.drive))
+    if camera := describe_camera(scenario.fine_tuner):
         say(camera)
     if args.in_process:
         from robot_formation.experiment.in_process import run_in_process
         from robot_formation.launching.processes import run_metadata
 
-        if scenario.parameters("world")["real_time_factor"] > 0.0:
+        if scenario.world.real_time_factor > 0.0:
             raise FormationError("--in-process runs as fast as it can; leave --real-time-factor out")
         return run_in_process(
             scenario, place.path, run_metadata(scenario), images=args.images, say=say, reservation=place

@@ -14,6 +14,7 @@ import cv2
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.marker import MarkerKind
 from robot_formation.parameters import parameter
 from robot_formation.paths import config_dir
 from robot_formation.vision.aruco_detector import BlockSensor, TagDetector, TagParameters
@@ -32,10 +33,9 @@ _WHITE = (255, 255, 255)
 class BlockDetectorNodeParameters(DetectorParameters):
     """The camera's own parameters, where its taught signatures are stored, and the search for tags instead."""
 
-    sensor: str = parameter(
-        "colours",
+    sensor: MarkerKind = parameter(
+        MarkerKind.COLOURS,
         "What is looked for; colours: blocks of the taught colours; tags: the ArUco tags of a marker of that kind",
-        choices=("colours", "tags"),
     )
 
     signatures_file: str = parameter(
@@ -86,7 +86,7 @@ class BlockDetectorComponent(Component):
             FormationError: if that file, or the other sensor, can't be used; nothing is changed then.
         """
         old, detector = self._parameters, self._detector
-        if parameters.sensor != old.sensor:
+        if parameters.sensor is not old.sensor:
             self._detector = _detector(parameters)
         elif isinstance(detector, TagDetector):
             detector.configure(parameters.tags, parameters)
@@ -147,7 +147,7 @@ class BlockDetectorComponent(Component):
 
 
 def _detector(parameters: BlockDetectorNodeParameters) -> BlockSensor:
-    if parameters.sensor == "tags":
+    if parameters.sensor is MarkerKind.TAGS:
         return TagDetector(parameters.tags, parameters)
     return BlockDetector(parameters.load(), parameters)
 

@@ -1,58 +1,138 @@
-"""The one table of nodes: which component and parameters each executable has, and where it runs."""
+"""The one table of nodes that have a component: their component and parameter classes, and which robots have them."""
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+from robot_formation import names
+from robot_formation.components.base import Component, Place
+from robot_formation.parameters import Choice
+
+if TYPE_CHECKING:
+    from robot_formation.components.block_detector import BlockDetectorNodeParameters
+    from robot_formation.components.fine_tuner import FineTunerNodeParameters
+    from robot_formation.components.overhead_tracker import OverheadTrackerNodeParameters
+    from robot_formation.components.world import WorldNodeParameters
+    from robot_formation.drive.movement_system import DriveParameters
+    from robot_formation.koopman.predictors import PredictorParameters
+    from robot_formation.leader.leader_motion import LeaderParameters
+
+P = TypeVar("P")
+_P = TypeVar("_P", contravariant=True)
+
+
+class ComponentClass(Protocol[_P]):
+    """A class of components with parameters of a class of their own."""
+
+    @property
+    def fixed(self) -> Mapping[str, str]:
+        """See `Component`."""
+
+    def __call__(self, parameters: _P, place: Place) -> Component:
+        """Make the component."""
+
+
+Classes = tuple[type[P], ComponentClass[P]]
+
+
+class Robots(Choice):
+    """Which robots have a node of a kind; none: there is one for the whole run."""
+
+    NONE = ""
+    ALL = "all"
+    LEADER = "leader"
+    FOLLOWERS = "followers"
 
 
 @dataclass(frozen=True)
-class NodeKind:
-    """An executable: its component and parameter classes by module path, and whether each robot has one of its own."""
+class NodeKind(Generic[P]):
+    """An executable with a component.
+
+    Attributes:
+        name: of the executable, and of its section in a scenario.
+        robots: which robots have one.
+        classes: imports and returns the classes of its parameters and of its component. Imported when asked for: no
+            node pays for another's libraries.
+    """
 
     name: str
-    component: str
-    parameters: str
-    robots: str  # "": one for the run; "all": one per robot; "leader" or "followers"
+    robots: Robots
+    classes: Callable[[], Classes[P]]
 
-    def component_class(self) -> Any:
-        """Import the component's class."""
-        return _import(self.component)
-
-    def parameter_class(self) -> Any:
+    def parameter_class(self) -> type[P]:
         """Import the parameters' class."""
-        return _import(self.parameters)
+        return self.classes()[0]
+
+    def component_class(self) -> ComponentClass[P]:
+        """Import the component's class."""
+        return self.classes()[1]
 
     def robots_of(self, followers: int) -> list[str]:
         """List the robots that have this node; [''] for a node of the run's own."""
-        follower_names = [f"follower_{n}" for n in range(1, followers + 1)]
-        return {"": [""], "all": ["leader", *follower_names], "leader": ["leader"], "followers": follower_names}[
-            self.robots
-        ]
+        of_followers = [names.follower(n) for n in range(1, followers + 1)]
+        return {
+            Robots.NONE: [""],
+            Robots.ALL: [names.LEADER, *of_followers],
+            Robots.LEADER: [names.LEADER],
+            Robots.FOLLOWERS: of_followers,
+        }[self.robots]
 
 
-def _import(path: str) -> Any:
-    module, _, name = path.rpartition(".")
-    return getattr(importlib.import_module(module), name)
+def _world() -> Classes[WorldNodeParameters]:
+    from robot_formation.components.world import WorldComponent, WorldNodeParameters
+
+    return WorldNodeParameters, WorldComponent
 
 
-def _kind(name: str, stem: str, parameters: str, robots: str) -> NodeKind:
-    base = f"robot_formation.components.{name}"
-    path = parameters if "." in parameters else f"{base}.{parameters}"
-    return NodeKind(name, f"{base}.{stem}Component", path, robots)
+def _overhead_tracker() -> Classes[OverheadTrackerNodeParameters]:
+    from robot_formation.components.overhead_tracker import OverheadTrackerComponent, OverheadTrackerNodeParameters
+
+    return OverheadTrackerNodeParameters, OverheadTrackerComponent
 
 
-# Order of start. Components are imported when asked for: no node pays for another's libraries.
-KINDS: dict[str, NodeKind] = {
-    kind.name: kind
-    for kind in (
-        _kind("world", "World", "WorldNodeParameters", ""),
-        _kind("overhead_tracker", "OverheadTracker", "OverheadTrackerNodeParameters", ""),
-        _kind("drive", "Drive", "robot_formation.drive.movement_system.DriveParameters", "all"),
-        _kind("block_detector", "BlockDetector", "BlockDetectorNodeParameters", "followers"),
-        _kind("predictor", "Predictor", "robot_formation.koopman.predictors.PredictorParameters", "followers"),
-        _kind("fine_tuner", "FineTuner", "FineTunerNodeParameters", "followers"),
-        _kind("leader", "Leader", "robot_formation.leader.leader_motion.LeaderParameters", "leader"),
-    )
-}
+def _drive() -> Classes[DriveParameters]:
+    from robot_formation.components.drive import DriveComponent
+    from robot_formation.drive.movement_system import DriveParameters
+
+    return DriveParameters, DriveComponent
+
+
+def _block_detector() -> Classes[BlockDetectorNodeParameters]:
+    from robot_formation.components.block_detector import BlockDetectorComponent, BlockDetectorNodeParameters
+
+    return BlockDetectorNodeParameters, BlockDetectorComponent
+
+
+def _predictor() -> Classes[PredictorParameters]:
+    from robot_formation.components.predictor import PredictorComponent
+    from robot_formation.koopman.predictors import PredictorParameters
+
+    return PredictorParameters, PredictorComponent
+
+
+def _fine_tuner() -> Classes[FineTunerNodeParameters]:
+    from robot_formation.components.fine_tuner import FineTunerComponent, FineTunerNodeParameters
+
+    return FineTunerNodeParameters, FineTunerComponent
+
+
+def _leader() -> Classes[LeaderParameters]:
+    from robot_formation.components.leader import LeaderComponent
+    from robot_formation.leader.leader_motion import LeaderParameters
+
+    return LeaderParameters, LeaderComponent
+
+
+# In the order of start.
+_ALL: tuple[NodeKind[Any], ...] = (
+    NodeKind("world", Robots.NONE, _world),
+    NodeKind("overhead_tracker", Robots.NONE, _overhead_tracker),
+    NodeKind("drive", Robots.ALL, _drive),
+    NodeKind("block_detector", Robots.FOLLOWERS, _block_detector),
+    NodeKind("predictor", Robots.FOLLOWERS, _predictor),
+    NodeKind("fine_tuner", Robots.FOLLOWERS, _fine_tuner),
+    NodeKind("leader", Robots.LEADER, _leader),
+)
+KINDS = {kind.name: kind for kind in _ALL}

@@ -45,7 +45,7 @@ def run_in_memory(
     code, _ = run.run()
     details = {
         "scenario": scenario.setup.name,
-        "timesteps": str(scenario.parameters("leader")["timesteps"]),
+        "timesteps": str(scenario.leader.timesteps),
         "outcome": OUTCOMES.get(code, "incomplete"),
     }
     return record_of(scenario.robots, messages, details, stamps)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from robot_formation import conversions, exit_codes
 from robot_formation.bag.bag_path import PathReservation, check_free
@@ -21,11 +21,13 @@ from robot_formation.bag.message_recorder import Recorder
 from robot_formation.bag.qos import TopicQos
 from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import NodeKind
+from robot_formation.components.world import WorldComponent
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import IMAGE_TYPE, Topic, absolute
-from robot_formation.parameters import from_mapping
+
+P = TypeVar("P")
 
 
 @dataclass
@@ -75,7 +77,7 @@ class InProcessRun:
     def _run(self) -> tuple[int, str]:
         for hosted in self._hosted:
             hosted.component.start()
-        world = self._hosted[0].component
+        (world,) = (h.component for h in self._hosted if isinstance(h.component, WorldComponent))
         while True:
             self._deliver()
             ended = [h.component for h in self._hosted if h.component.exit_code is not None]
@@ -91,11 +93,8 @@ class InProcessRun:
                 raise RunError(f"the run stands still: everybody waits for somebody{last}")
             world.work()
 
-    def _host(self, kind: NodeKind, robot: str) -> _Hosted:
-        parameters = from_mapping(
-            kind.parameter_class(), self.scenario.robot_parameters(kind.name, robot), where=f"{robot}/{kind.name}"
-        )
-        component: Component = kind.component_class()(parameters, Place(robot))
+    def _host(self, kind: NodeKind[P], robot: str) -> _Hosted:
+        component = kind.component_class()(self.scenario.of_robot(kind, robot), Place(robot))
         namespace = f"/{robot}" if robot else ""
         component.attach(partial(self._send, namespace), partial(self._say, f"{namespace}/{kind.name}"))
         return _Hosted(component, namespace)
@@ -142,7 +141,7 @@ def run_in_process(
         FormationError: if a component refuses its parameters, or the bag's path is taken or can't be written.
     """
     began = time.monotonic()
-    timesteps = scenario.parameters("leader")["timesteps"]
+    timesteps = scenario.leader.timesteps
     progress = Progress(scenario.setup.followers, timesteps, say, lambda: time.monotonic() - began)
     run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
     with contextlib.ExitStack() as stack:

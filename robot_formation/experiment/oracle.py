@@ -16,14 +16,11 @@ import numpy as np
 
 from robot_formation import conversions, names
 from robot_formation.alignment.paper_rules import AlignmentParameters
-from robot_formation.components.fine_tuner import FineTunerNodeParameters
 from robot_formation.components.predictor import PredictorComponent
-from robot_formation.components.world import WorldNodeParameters
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
-from robot_formation.parameters import from_mapping
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose, pose_on_surface
@@ -41,12 +38,10 @@ class IdealRun(InProcessRun):
         self._changes: dict[str, Motion] = {}  # what was commanded in this timestep less what was predicted
         self._camera_errors: dict[str, list[tuple[float, float]]] = defaultdict(list)
         self._odometry = {names.absolute("", names.ground_truth_odom(robot).name): robot for robot in scenario.robots}
-        world = from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world")
+        world = scenario.world
         self._surface = world.make_surface()
         self._face = TargetFace(Camera(self._surface, world), world)
-        self._alignment = from_mapping(
-            FineTunerNodeParameters, scenario.parameters("fine_tuner"), where="fine_tuner"
-        ).alignment
+        self._alignment = scenario.fine_tuner.alignment
         super().__init__(scenario, listen=listen)
         self._predictors: dict[str, PredictorComponent] = {}
         for hosted in self._hosted:

@@ -15,7 +15,7 @@ from robot_formation.bag.reader import Bag
 from robot_formation.bag.run_details import mapping, node_parameters
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.parameters import from_mapping, specs
 
 

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from robot_formation import names
 from robot_formation.calibration.camera_check import check_camera
 from robot_formation.calibration.drive_check import check_curves
+from robot_formation.components.block_detector import BlockDetectorNodeParameters
 from robot_formation.components.catalogue import KINDS, NodeKind
-from robot_formation.errors import FormationError, shown
+from robot_formation.components.fine_tuner import FineTunerNodeParameters
+from robot_formation.components.overhead_tracker import OverheadTrackerNodeParameters
+from robot_formation.components.world import WorldNodeParameters
+from robot_formation.drive.movement_system import DriveParameters
+from robot_formation.errors import shown
+from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+from robot_formation.koopman.predictors import PredictorParameters
+from robot_formation.leader.leader_motion import LeaderParameters
+from robot_formation.marker import MarkerKind
 from robot_formation.parameters import (
     ParameterError,
     check_as,
@@ -27,7 +35,11 @@ from robot_formation.parameters import (
 )
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
-from robot_formation.system.yaml_files import YamlError, parse_yaml, read_yaml
+from robot_formation.system.yaml_files import YamlError, parse_yaml
+
+P = TypeVar("P")
+Settings = Mapping[str, Mapping[str, object]]
+"""Parameters that differ from config/: by node, then by dotted name."""
 
 # Parameters that follow from the setup, and what to set instead.
 _FIXED = {
@@ -45,10 +57,6 @@ _FIXED = {
 }
 
 
-class ScenarioError(FormationError):
-    """A scenario, a preset or an override can't be used."""
-
-
 @dataclass(frozen=True)
 class Setup:
     """What a scenario says beside the nodes' parameters."""
@@ -59,94 +67,119 @@ class Setup:
     start_x_m: float = parameter(0.763, "Start of the leader", unit="m", low=-10.0, high=100.0)
     start_y_m: float = parameter(0.158, "Start of the leader", unit="m", low=-10.0, high=100.0)
     heading_deg: float = parameter(90.0, "Heading of the formation", unit="deg", low=-360.0, high=360.0)
-    marker: str = parameter(
-        "colours", "What the robots' markers carry and their cameras look for", choices=("colours", "tags")
-    )
+    marker: MarkerKind = parameter(MarkerKind.COLOURS, "What the robots' markers carry and their cameras look for")
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A setup and the parameters that differ from config/, flat, by node kind."""
+    """A setup and every node's parameters, checked. `build` makes one; it is never changed but made anew.
+
+    Attributes:
+        setup: what a scenario says beside the nodes' parameters.
+        settings: the parameters that it sets, from which it is made anew when something is changed.
+    """
 
     setup: Setup
-    sections: Mapping[str, Mapping[str, Any]]
+    settings: Settings
+    world: WorldNodeParameters
+    overhead_tracker: OverheadTrackerNodeParameters
+    drive: DriveParameters
+    block_detector: BlockDetectorNodeParameters
+    predictor: PredictorParameters
+    fine_tuner: FineTunerNodeParameters
+    leader: LeaderParameters
 
     @property
     def robots(self) -> list[str]:
         """Names of the robots, the leader first."""
-        return [names.LEADER, *(names.follower(n) for n in range(1, self.setup.followers + 1))]
+        return _robots(self.setup)
 
-    def parameters(self, kind: str) -> dict[str, Any]:
-        """Collect a node's parameters: config/, then the scenario's, then what the setup fixes; flat and checked.
+    def node(self, kind: NodeKind[P]) -> P:
+        """Return the parameters of a kind of node."""
+        found: P = getattr(self, kind.name)
+        return found
 
-        With `marker: tags` the files in config/tags, which hold what differs then, come after those in config/.
+    def of_robot(self, kind: NodeKind[P], robot: str) -> P:
+        """Return the parameters of one robot's node."""
+        found = self.node(kind)
+        if isinstance(found, FineTunerNodeParameters):
+            # The leader hears every follower, a follower the one on its left.
+            return replace(found, done_listeners=1 if robot == self.robots[-1] else 2)
+        return found
 
-        Raises:
-            ParameterError: on an unknown name, a wrong type or a value out of range.
-        """
-        values = {**self._defaults(kind), **self.sections.get(kind, {})}
-        if kind == "world":
-            values.update(self._world())
-        elif kind == "overhead_tracker":
-            world = self.parameters("world")
-            known = ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters")
-            values = {**values, **{name: world[name] for name in known}, **self.sections.get(kind, {})}
-        elif kind == "leader":
-            values["followers"] = self.robots[1:]
-        checked = from_mapping(KINDS[kind].parameter_class(), values, where=kind)
-        return to_mapping(checked)
+    def by_node(self) -> dict[str, dict[str, object]]:
+        """List all parameters as plain values: by node, then by dotted name."""
+        return {name: to_mapping(self.node(kind)) for name, kind in KINDS.items()}
 
-    def _defaults(self, kind: str) -> dict[str, Any]:
-        values = node_defaults(kind)
-        overlay = config_dir() / "tags" / f"{kind}.yaml"
-        if self.setup.marker == "tags" and overlay.exists():
-            values.update(parameter_file(overlay))
-        return values
-
-    def hosts(self) -> Iterator[tuple[NodeKind, str]]:
+    def hosts(self) -> Iterator[tuple[NodeKind[object], str]]:
         """Yield every node to start, in order, with its robot ('' for the run's own)."""
-        overhead = self.parameters("world")["overhead.enabled"]
         for kind in KINDS.values():
-            if kind.name != "overhead_tracker" or overhead:
+            if kind.name != "overhead_tracker" or self.world.overhead.enabled:
                 yield from ((kind, robot) for robot in kind.robots_of(self.setup.followers))
 
-    def robot_parameters(self, kind: str, robot: str) -> dict[str, Any]:
-        """Collect the parameters of one robot's node."""
-        values = self.parameters(kind)
-        if kind == "fine_tuner":
-            # The leader hears every follower, a follower the one on its left.
-            values["done_listeners"] = 1 if robot == self.robots[-1] else 2
-        return values
-
     def check(self) -> None:
-        """Check every node's parameters, the surface's, and the drives' and the camera's calibrations.
+        """Check what several nodes have to agree on: the starts, the drives, and the robots' and camera's calibrations.
 
         Raises:
             FormationError: naming what is wrong.
         """
-        for kind in KINDS:
-            self.parameters(kind)
-        world, drive = self.parameters("world"), self.parameters("drive")
-        if drive["wheel_speed_rad_s"] > world["motor.max_speed_rad_s"]:
+        fastest = self.world.motor.max_speed_rad_s
+        if self.drive.wheel_speed_rad_s > fastest:
             raise ParameterError(
-                f"drive: 'wheel_speed_rad_s' is {drive['wheel_speed_rad_s']}, more than the world's "
-                f"'motor.max_speed_rad_s' of {world['motor.max_speed_rad_s']}: every move would be refused"
+                f"drive: 'wheel_speed_rad_s' is {self.drive.wheel_speed_rad_s}, more than the world's "
+                f"'motor.max_speed_rad_s' of {fastest}: every move would be refused"
             )
-        from_mapping(KINDS["world"].parameter_class(), world, where="world").check()
-        check_curves(self)
-        check_camera(self)
+        self.world.check()
+        check_curves(self.drive, self.world, self.robots)
+        check_camera(self.fine_tuner, self.world)
 
-    def _world(self) -> dict[str, Any]:
-        heading = math.radians(self.setup.heading_deg)
-        right = (math.sin(heading), -math.cos(heading))
-        places = [FORMATION_DISTANCE_M * n for n in range(len(self.robots))]
-        return {
-            "seed": self.setup.seed,
-            "robots": self.robots,
-            "start_x_m": [self.setup.start_x_m + d * right[0] for d in places],
-            "start_y_m": [self.setup.start_y_m + d * right[1] for d in places],
-            "start_heading_rad": [heading] * len(self.robots),
-        }
+
+def build(setup: Setup, settings: Settings) -> Scenario:
+    """Make every node's parameters: config/, then the scenario's settings, then what follows from the setup.
+
+    Raises:
+        ParameterError: on an unknown name, a wrong type or a value out of range.
+    """
+
+    def made(cls: type[P], kind: str, **follows: object) -> P:
+        values = {**node_defaults(kind, setup.marker), **settings.get(kind, {}), **follows}
+        return from_mapping(cls, values, where=kind)
+
+    world = made(WorldNodeParameters, "world", **_starts(setup))
+    own = settings.get("overhead_tracker", {})
+    known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
+    return Scenario(
+        setup,
+        settings,
+        world,
+        made(OverheadTrackerNodeParameters, "overhead_tracker", **known),
+        made(DriveParameters, "drive"),
+        made(BlockDetectorNodeParameters, "block_detector"),
+        made(PredictorParameters, "predictor"),
+        made(FineTunerNodeParameters, "fine_tuner"),
+        made(LeaderParameters, "leader", followers=_robots(setup)[1:]),
+    )
+
+
+_KNOWN_FROM_ABOVE = ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters")
+
+
+def _robots(setup: Setup) -> list[str]:
+    return [names.LEADER, *(names.follower(n) for n in range(1, setup.followers + 1))]
+
+
+def _starts(setup: Setup) -> dict[str, object]:
+    """Return the world's parameters that follow from the setup: each robot stands on the right of the one before."""
+    robots, heading = _robots(setup), math.radians(setup.heading_deg)
+    right = (math.sin(heading), -math.cos(heading))
+    places = [FORMATION_DISTANCE_M * n for n in range(len(robots))]
+    return {
+        "seed": setup.seed,
+        "robots": robots,
+        "start_x_m": [setup.start_x_m + d * right[0] for d in places],
+        "start_y_m": [setup.start_y_m + d * right[1] for d in places],
+        "start_heading_rad": [heading] * len(robots),
+    }
 
 
 def presets() -> dict[str, Path]:
@@ -177,7 +210,7 @@ def load(path: Path) -> Scenario:
         ScenarioError: if it can't be read or isn't a mapping.
         ParameterError: on unknown or wrong entries.
     """
-    content = _read(path)
+    content = read_scenario_yaml(path)
     if not isinstance(content, Mapping):
         raise ScenarioError(
             f"{path}: a scenario is a mapping with entries like 'seed' and 'leader'; see config/scenarios"
@@ -188,17 +221,17 @@ def load(path: Path) -> Scenario:
             raise ParameterError(f"{path}: no entry '{key}'{suggestion(str(key), known)}")
     top = {key: value for key, value in content.items() if key not in KINDS}
     setup = from_mapping(Setup, {"name": path.stem, **top}, where=str(path))
-    sections = {}
+    sections: dict[str, dict[str, object]] = {}
     for kind in KINDS:
         section = content.get(kind, {})
         section = {} if section is None else section  # an entry with nothing below it
         if not isinstance(section, Mapping):
             raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {shown(section)}")
         sections[kind] = _checked(kind, flatten(section, where=f"{path}: {kind}"), where=f"{path}: {kind}")
-    return Scenario(setup, sections)
+    return build(setup, sections)
 
 
-def _checked(kind: str, section: Mapping[str, Any], *, where: str) -> dict[str, Any]:
+def _checked(kind: str, section: Mapping[str, object], *, where: str) -> dict[str, object]:
     for name in section:
         if name in _FIXED.get(kind, {}):
             raise ParameterError(f"{where}: '{name}' follows from the scenario; set {_FIXED[kind][name]} instead")
@@ -218,7 +251,7 @@ def override(scenario: Scenario, settings: Sequence[str], *, source: str = "--se
         ScenarioError: if a setting has no '=' or names no node.
         ParameterError: on an unknown parameter or a wrong value.
     """
-    values: list[tuple[str, Any]] = []
+    values: list[tuple[str, object]] = []
     for setting in settings:
         key, equals, text = setting.partition("=")
         if not equals:
@@ -227,14 +260,14 @@ def override(scenario: Scenario, settings: Sequence[str], *, source: str = "--se
     return with_values(scenario, values, source=source)
 
 
-def _yaml_value(text: str, subject: str) -> Any:
+def _yaml_value(text: str, subject: str) -> object:
     try:
         return parse_yaml(text)
     except YamlError as error:
         raise ScenarioError(f"{subject}: {shown(text)} is no YAML value: {error.problem}") from None
 
 
-def with_option(scenario: Scenario, key: str, value: Any, source: str) -> Scenario:
+def with_option(scenario: Scenario, key: str, value: object, source: str) -> Scenario:
     """Set 'seed' or 'NODE.PARAMETER' from an option of its own; errors name only the option.
 
     Args:
@@ -253,15 +286,15 @@ def with_option(scenario: Scenario, key: str, value: Any, source: str) -> Scenar
     return with_value(scenario, key, check_as(spec, value, source))
 
 
-def with_value(scenario: Scenario, key: str, value: Any) -> Scenario:
+def with_value(scenario: Scenario, key: str, value: object) -> Scenario:
     """Set one value: 'seed' or 'NODE.PARAMETER'. Errors as for `override`."""
     return with_values(scenario, [(key, value)])
 
 
-def with_values(scenario: Scenario, values: Sequence[tuple[str, Any]], *, source: str = "--set") -> Scenario:
+def with_values(scenario: Scenario, values: Sequence[tuple[str, object]], *, source: str = "--set") -> Scenario:
     """Set values together, so that only their sum has to make sense. Errors as for `override`."""
     setup = to_mapping(scenario.setup)
-    sections = {kind: dict(section) for kind, section in scenario.sections.items()}
+    sections = {kind: dict(section) for kind, section in scenario.settings.items()}
     for key, value in values:
         kind, dot, name = key.partition(".")
         if dot and kind not in KINDS:
@@ -273,7 +306,7 @@ def with_values(scenario: Scenario, values: Sequence[tuple[str, Any]], *, source
         else:
             setup[key] = value
     checked = {kind: _checked(kind, section, where=f"{source}: {kind}") for kind, section in sections.items()}
-    return Scenario(from_mapping(Setup, setup, where=source), checked)
+    return build(from_mapping(Setup, setup, where=source), checked)
 
 
 def with_surface(scenario: Scenario, surface: str) -> Scenario:
@@ -282,36 +315,3 @@ def with_surface(scenario: Scenario, surface: str) -> Scenario:
         raise ParameterError(f"no surface '{surface}'{suggestion(surface, SURFACES)}")
     scenario = with_value(scenario, "world.surface", surface)
     return with_value(scenario, "world.surface_parameters", [])
-
-
-def node_defaults(kind: str) -> dict[str, Any]:
-    """Read config/NODE.yaml: the parameters of a node in ROS's own file format, flat.
-
-    Raises:
-        ScenarioError: if the file has not the form of a ROS parameter file.
-    """
-    return parameter_file(config_dir() / f"{kind}.yaml")
-
-
-def parameter_file(path: Path) -> dict[str, Any]:
-    """Read a ROS parameter file for nodes of any name, flat.
-
-    Raises:
-        ScenarioError: if it can't be read or has another form.
-    """
-    # A run asks for them many times, and PyYAML takes milliseconds each.
-    changed_ns = path.stat().st_mtime_ns if path.exists() else 0
-    return dict(_parameter_file(path, changed_ns))
-
-
-@lru_cache(maxsize=64)
-def _parameter_file(path: Path, changed_ns: int) -> dict[str, Any]:
-    content = _read(path)
-    try:
-        return flatten(content["/**"]["ros__parameters"], where=str(path))
-    except (KeyError, TypeError, AttributeError):
-        raise ScenarioError(f"{path}: a ROS parameter file begins with '/**:' and 'ros__parameters:'") from None
-
-
-def _read(path: Path) -> Any:
-    return read_yaml(path, refuse=ScenarioError, remedy="give a scenario's YAML file, like those in config/scenarios")

@@ -119,7 +119,7 @@ class Plan:
     def conditions(self) -> dict[str, Any]:
         """List the conditions of all runs by name, as those of a single run."""
         scenario = build(Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0]), self.settings)
-        found = conditions({kind: scenario.parameters(kind) for kind in ("world", "fine_tuner")})
+        found = conditions(scenario.by_node())
         return {**found, "in_process": True}
 
     def tasks(self) -> Iterator[Task]:

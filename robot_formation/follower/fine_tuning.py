@@ -16,10 +16,17 @@ from robot_formation.alignment.paper_rules import AlignmentParameters, Decision,
 from robot_formation.alignment.precise.precise_mode import PreciseAlignment, PreciseParameters
 from robot_formation.follower.alignment_state import AlignmentState, State
 from robot_formation.geometry.se2 import Motion
-from robot_formation.parameters import parameter
+from robot_formation.parameters import Choice, parameter
 from robot_formation.vision.pixy2.block import Block
 
 COLLECTION_TIMESTEPS = 3
+
+
+class AlignmentModeName(Choice):
+    """How a follower uses its camera's blocks: by the rules of the paper, or with a pose filter."""
+
+    PAPER = "paper"
+    PRECISE = "precise"
 
 
 @dataclass(frozen=True)
@@ -46,7 +53,7 @@ class LookParameters:
 class FineTunerParameters:
     """Parameters of the follower's fine-tuning controller."""
 
-    mode: str = parameter("precise", "How the camera's blocks are used", choices=("paper", "precise"))
+    mode: AlignmentModeName = parameter(AlignmentModeName.PRECISE, "How the camera's blocks are used")
     first_step_m: float = parameter(
         0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
     )
@@ -295,6 +302,6 @@ class FineTuner:
 
 
 def _mode(parameters: FineTunerParameters) -> AlignmentMode:
-    if parameters.mode == "paper":
+    if parameters.mode is AlignmentModeName.PAPER:
         return PaperMode(parameters.alignment)
     return PreciseAlignment(parameters.precise, parameters.first_step_m)

@@ -131,7 +131,7 @@ class Launcher:
         from robot_formation.nodes.progress.monitor import Monitor  # here, since it needs the environment of the wheels
 
         began = time.monotonic()
-        setup, timesteps = self.scenario.setup, self.scenario.parameters("leader")["timesteps"]
+        setup, timesteps = self.scenario.setup, self.scenario.leader.timesteps
         progress = Progress(setup.followers, timesteps, self._tell, lambda: time.monotonic() - began)
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:
@@ -175,7 +175,7 @@ class Launcher:
                     monitor.spin(_POLL_S)
 
     def _patience_s(self) -> float:
-        factor = self.scenario.parameters("world")["real_time_factor"]
+        factor = self.scenario.world.real_time_factor
         return self.silence_s / (min(factor, 1.0) or 1.0)
 
     def _tell(self, text: str) -> None:

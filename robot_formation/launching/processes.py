@@ -12,8 +12,8 @@ from robot_formation import names
 from robot_formation.bag.provenance import git_commit, versions
 from robot_formation.calibration.camera_check import camera_values
 from robot_formation.calibration.drive_check import robot_curves
-from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.parameters import to_mapping
 
 RECORDER = "recorder"
 
@@ -63,14 +63,14 @@ def processes(
         }
         found.append(Process(RECORDER, namespace, parameters))
     for kind, robot in scenario.hosts():
-        values = {**scenario.robot_parameters(kind.name, robot), **host}
+        values = {**to_mapping(scenario.of_robot(kind, robot)), **host}
         found.append(Process(kind.name, _inside(namespace, robot), values))
     return found
 
 
 def progress(scenario: Scenario, namespace: str) -> Process:
     """Make the process that prints a launched run's progress; `formation run` follows the run itself."""
-    parameters = {"followers": scenario.setup.followers, "timesteps": scenario.parameters("leader")["timesteps"]}
+    parameters = {"followers": scenario.setup.followers, "timesteps": scenario.leader.timesteps}
     return Process(names.PROGRESS, namespace, parameters)
 
 
@@ -83,18 +83,18 @@ def _inside(namespace: str, robot: str) -> str:
 
 def run_metadata(scenario: Scenario) -> dict[str, str]:
     """Describe a run for the bag's metadata record: scenario, seed, what ran with which parameters and versions."""
-    world, leader, predictor = (scenario.parameters(kind) for kind in ("world", "leader", "predictor"))
+    world = scenario.world
     return {
         "scenario": scenario.setup.name,
         "seed": str(scenario.setup.seed),
-        "predictor": predictor["name"],
-        "surface": world["surface"],
-        "surface_parameters": json.dumps(dict(text.split("=", 1) for text in world["surface_parameters"])),
-        "timesteps": str(leader["timesteps"]),
-        "camera": world["camera.mode"],
-        "parameters": json.dumps({kind: scenario.parameters(kind) for kind in KINDS}, sort_keys=True),
-        "drive_curves": json.dumps(robot_curves(scenario)),
-        "camera_calibration": json.dumps(camera_values(scenario)),
+        "predictor": scenario.predictor.name,
+        "surface": world.surface,
+        "surface_parameters": json.dumps(dict(text.split("=", 1) for text in world.surface_parameters)),
+        "timesteps": str(scenario.leader.timesteps),
+        "camera": world.camera.mode.value,
+        "parameters": json.dumps(scenario.by_node(), sort_keys=True),
+        "drive_curves": json.dumps(robot_curves(scenario.drive, scenario.robots)),
+        "camera_calibration": json.dumps(camera_values(scenario.fine_tuner)),
         "versions": json.dumps(versions()),
         "git_commit": git_commit(),
     }

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from robot_formation.parameters import ParameterError, parameter
+from robot_formation.marker import MarkerKind
+from robot_formation.parameters import Choice, ParameterError, parameter
 
-MARKER_KINDS = ("colours", "tags")
-DRIVE_MODES = ("pwm_stop", "pid")
-CAMERA_MODES = ("stream", "on_demand")
+
+class DriveMode(Choice):
+    """How a robot's firmware ends a motion."""
+
+    PWM_STOP = "pwm_stop"
+    PID = "pid"
+
+
+class CameraMode(Choice):
+    """When a robot's camera takes frames: at every tick while time advances, or as requested."""
+
+    STREAM = "stream"
+    ON_DEMAND = "on_demand"
 
 
 @dataclass(frozen=True)
@@ -49,10 +60,9 @@ class WheelParameters:
 class MotorParameters:
     """Geared DC motors, their encoders and the firmware that stops them."""
 
-    drive_mode: str = parameter(
-        "pwm_stop",
+    drive_mode: DriveMode = parameter(
+        DriveMode.PWM_STOP,
         "pwm_stop: constant PWM until the encoder count is reached, then short brake; pid: trapezoid and PID",
-        choices=DRIVE_MODES,
     )
     max_speed_rad_s: float = parameter(12.0, "no-load speed at full PWM", unit="rad/s", low=0.5, high=100.0)
     max_angle_rad: float = parameter(200.0, "largest wheel angle of one command", unit="rad", low=1.0, high=1e5)
@@ -125,8 +135,8 @@ class CameraParameters:
     Descriptions of what a user tunes on the camera begin with the parameter's name in PixyMon.
     """
 
-    mode: str = parameter(
-        "stream", "stream: a frame at every tick while time advances; on_demand: requested frames", choices=CAMERA_MODES
+    mode: CameraMode = parameter(
+        CameraMode.STREAM, "stream: a frame at every tick while time advances; on_demand: requested frames"
     )
     camera_brightness: int = parameter(
         100,
@@ -226,10 +236,9 @@ class MarkerParameters:
     The three faces have a colour each, or carry a tag each. Colours are red, green, blue from 0 to 255 in linear light.
     """
 
-    kind: str = parameter(
-        "colours",
+    kind: MarkerKind = parameter(
+        MarkerKind.COLOURS,
         "what tells the faces apart; colours: one each; tags: an ArUco tag each, for block_detector's sensor 'tags'",
-        choices=MARKER_KINDS,
     )
     edge_m: float = parameter(0.06, "edge of the cube", unit="m", low=0.005, high=0.5)
     top_m: float = parameter(0.216, "height of its top, the robot's height", unit="m", low=0.02, high=2.0)
@@ -251,7 +260,7 @@ class MarkerParameters:
     @property
     def face_colours(self) -> tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]:
         """Ground colours of Target, Front and Rear."""
-        if self.kind == "tags":
+        if self.kind is MarkerKind.TAGS:
             return (self.tag_light_rgb,) * 3
         return self.target_rgb, self.front_rgb, self.rear_rgb
 

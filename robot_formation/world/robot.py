@@ -12,7 +12,7 @@ from robot_formation.surface import Surface
 from robot_formation.world.body import Body
 from robot_formation.world.events import JOINT_NAMES, JointStates
 from robot_formation.world.imperfections import draw_imperfections, generator
-from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.parameters import DriveMode, WorldParameters
 from robot_formation.world.pose import Pose, pose_on_surface
 from robot_formation.world.wheel import HELD
 
@@ -112,12 +112,12 @@ class Robot:
             return
         self.awake = True
         motor = self.parameters.motor
-        lateness = self._draw_lateness() if motor.drive_mode == "pwm_stop" else (0.0,) * 5
+        lateness = self._draw_lateness() if motor.drive_mode is DriveMode.PWM_STOP else (0.0,) * 5
         for wheel, angle, speed, own in zip(self.body.wheels, angles, speeds, lateness[1:], strict=True):
             if angle == 0.0:
                 continue
             share = speed / top
-            if motor.drive_mode == "pwm_stop":
+            if motor.drive_mode is DriveMode.PWM_STOP:
                 wheel.start_pwm(angle, speed, lateness[0] * share + own)
             else:
                 wheel.start_pid(angle, speed, motor.acceleration_rad_s2 * share)

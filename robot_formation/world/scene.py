@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.marker import MarkerKind
 from robot_formation.surface import Surface
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
@@ -57,7 +58,7 @@ class Scene:
             self._add_box((PEDESTAL_M, PEDESTAL_M, foot - chassis.body_top_m), chassis.body_top_m, (grey,) * 5)
         target, front, rear = marker.face_colours
         self._add_box((marker.edge_m,) * 3, foot, (front, rear, grey, target, grey))
-        if marker.kind == "tags":
+        if marker.kind is MarkerKind.TAGS:
             for face in FACES:
                 for corners, normal, light in tag_rectangles(face, marker.edge_m, marker.top_m - 0.5 * marker.edge_m):
                     self._add_face(corners, normal, marker.tag_light_rgb if light else marker.tag_dark_rgb)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from robot_formation.world.parameters import MotorParameters
+from robot_formation.world.parameters import DriveMode, MotorParameters
 
 HELD = 0
 DRIVING = 1
@@ -79,7 +79,7 @@ class Wheel:
         dt: float,
     ) -> None:
         self._p = parameters
-        self._pwm = parameters.drive_mode == "pwm_stop"
+        self._pwm = parameters.drive_mode is DriveMode.PWM_STOP
         self._per_inertia = dt / parameters.inertia_kg_m2
         self._damping = 1.0 + self._per_inertia * parameters.back_emf_n_m_s
         self._friction = self._per_inertia * parameters.friction_n_m / self._damping

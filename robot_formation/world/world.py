@@ -11,7 +11,7 @@ from robot_formation.world.bullet import pybullet
 from robot_formation.world.camera import Camera, Picture
 from robot_formation.world.checks import Command, WorldError, check_command, check_setup
 from robot_formation.world.events import BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
-from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.parameters import CameraMode, WorldParameters
 from robot_formation.world.pose import Pose, off_plate
 from robot_formation.world.robot import Robot, RobotStart
 from robot_formation.world.sensor import Development, Sensor
@@ -250,7 +250,7 @@ class World:
         return events
 
     def _frames(self) -> list[Event]:
-        stream = self.parameters.camera.mode == "stream"
+        stream = self.parameters.camera.mode is CameraMode.STREAM
         frames: list[Event] = []
         for name, owed in self._frames_owed.items():
             if owed or stream:

@@ -32,7 +32,7 @@ from robot_formation.nodes.recorder.intake import Intake
 from robot_formation.nodes.recorder.parameter_snapshot import ParameterSnapshot
 from robot_formation.nodes.recorder.recorder_health import RecorderHealth
 from robot_formation.nodes.recorder.topic_qos import accepting, accepts, offered
-from robot_formation.parameters import ParameterError, parameter
+from robot_formation.parameters import Choice, ParameterError, parameter
 
 _DISCOVERY_S = 0.05
 _REVIEW_S = 1.0
@@ -43,6 +43,20 @@ _OLDEST_CHUNK_S = 1.0
 _ROUND_S = 0.03
 _QUIET_ROUNDS = 4  # without a message after the signal to end: everything sent has arrived
 _LONGEST_DRAIN_S = 5.0
+
+
+class LogTime(Choice):
+    """Which time a recorded message gets: its own stamp or the latest one before it, or the wall clock."""
+
+    SIMULATED = "simulated"
+    RECEIVE = "receive"
+
+
+class Compression(Choice):
+    """How a bag's chunks are compressed."""
+
+    ZSTD = "zstd"
+    NONE = "none"
 
 
 @dataclass(frozen=True)
@@ -64,12 +78,11 @@ class RecorderParameters:
         "Record only what lies in the recorder's own namespace or 'topics' names, and of /diagnostics what is said of "
         "the nodes there",
     )
-    time: str = parameter(
-        "simulated",
+    time: LogTime = parameter(
+        LogTime.SIMULATED,
         "Log times: a message's own stamp or the latest one before it (simulated), or the wall clock (receive)",
-        choices=("simulated", "receive"),
     )
-    compression: str = parameter("zstd", "Compression of the chunks", choices=("zstd", "none"))
+    compression: Compression = parameter(Compression.ZSTD, "Compression of the chunks")
     chunk_bytes: int = parameter(CHUNK_BYTES, "Size at which a chunk is closed", unit="B", low=1024, high=2**30)
     split_bytes: int = parameter(
         0, "Size of a file after which the next one is begun; 0: never", unit="B", low=0, high=2**62
@@ -153,7 +166,7 @@ class RecorderNode:
         self._selection = parameters.selection(node.resolve_topic_name, node.get_namespace())
         self._recorder = Recorder(Path(parameters.path), parameters.texts(), parameters.write_options())
         self._queue = RecordingQueue(self._recorder, parameters.queue_bytes)
-        self._receive_time = parameters.time == "receive"
+        self._receive_time = parameters.time is LogTime.RECEIVE
         self._subscribed: dict[str, Intake] = {}
         # Topics that the bag's recorder makes itself of true poses, or is likely to, and their types.
         self._made = {**made_in(""), **made_in(node.get_namespace())}

@@ -8,21 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.parameters import parameter
+from robot_formation.parameters import Choice, parameter
 from robot_formation.surface import Surface
 from robot_formation.vision.overhead.camera_calibration import Calibration, ImperfectCalibration, Locator
 from robot_formation.vision.overhead.dots import find_dots
 
 Array = NDArray[np.float64]
 
-CALIBRATIONS = ("good", "imperfect")
+
+class UsedCalibration(Choice):
+    """Which of the tracker's two calibrations is used."""
+
+    GOOD = "good"
+    IMPERFECT = "imperfect"
 
 
 @dataclass(frozen=True)
 class OverheadTrackingParameters:
     """The tracker's calibrations, and how it follows dots."""
 
-    calibration: str = parameter("good", "which of the two calibrations is used", choices=CALIBRATIONS)
+    calibration: UsedCalibration = parameter(UsedCalibration.GOOD, "which of the two calibrations is used")
     dot_height_m: float = parameter(0.216, "height of the dot above base_link", unit="m", low=0.0, high=2.0)
     dot_radius_m: float = parameter(0.015, "radius of the dot", unit="m", low=0.001, high=0.2)
     threshold: int = parameter(150, "8-bit level between the dots and everything else", low=1, high=254)
@@ -39,7 +44,7 @@ class OverheadTrackingParameters:
 
     def chosen(self) -> Calibration:
         """Return the calibration in use."""
-        return self.good if self.calibration == "good" else self.imperfect
+        return self.good if self.calibration is UsedCalibration.GOOD else self.imperfect
 
 
 @dataclass
