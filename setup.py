@@ -69,6 +69,7 @@ setup(
             "odmd",
             "pykoop",
             "pytest>=7.4.4",
+            "jsonschema",
             "pytest-xdist",
             "ruff",
             "types-PyYAML",

@@ -24,15 +24,13 @@ from robot_formation.calibration.alignment_trial import (
     gap_m,
     poses,
 )
-from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
-from robot_formation.parameters import from_mapping
 from robot_formation.system.files import whole_lines
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world.events import Frame
 from robot_formation.world.pose import Pose
-from robot_formation.world.robot import RobotStart
+from robot_formation.world.start import RobotStart
 from robot_formation.world.world import World
 
 PLACES_M = tuple(number * 0.05 for number in range(-9, 10))
@@ -81,13 +79,8 @@ def equipment(mode: str, settings: Sequence[str] = ()) -> Equipment:
         FormationError: on a misspelt or wrong setting KEY=VALUE.
     """
     scenario = scenarios.override(scenarios.load_track("two"), [*CONDITIONS, *settings, f"fine_tuner.mode={mode}"])
-    made = {
-        kind: from_mapping(KINDS[kind].parameter_class(), scenario.parameters(kind), where=kind)
-        for kind in ("world", "drive", "block_detector", "fine_tuner")
-    }
-    return Equipment(
-        made["world"].make_surface(), made["world"], made["drive"], made["block_detector"], made["fine_tuner"]
-    )
+    world = scenario.world
+    return Equipment(world.make_surface(), world, scenario.drive, scenario.block_detector, scenario.fine_tuner)
 
 
 def starts() -> Iterator[Start]:

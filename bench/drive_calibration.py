@@ -16,8 +16,9 @@ import numpy as np
 from robot_formation.drive.movement_system import CalibrationParameters, DriveParameters
 from robot_formation.parameters import from_mapping, specs
 from robot_formation.surface import make_surface
-from robot_formation.world import RobotStart, World, WorldParameters
-from robot_formation.world.parameters import DRIVE_MODES, ImperfectionParameters
+from robot_formation.world.parameters import DriveMode, ImperfectionParameters, WorldParameters
+from robot_formation.world.start import RobotStart
+from robot_formation.world.world import World
 
 SIGNS = {"v": (1.0, 1.0, 1.0, 1.0), "u": (1.0, -1.0, -1.0, 1.0), "turn": (-1.0, 1.0, -1.0, 1.0)}
 UNITS = {"v": ("m", "rad/m"), "u": ("m", "rad/m"), "turn": ("rad", "rad/rad")}
@@ -89,7 +90,7 @@ def main():
     print(
         f"  by {STEP_M * 1e3:g} mm of rolling without calibration; driven along v, and to the lower side when across:"
     )
-    for mode in DRIVE_MODES:
+    for mode in DriveMode:
         ideal = world_parameters(ideal=True, drive_mode=mode)
         moved = {
             name: drive(

@@ -27,7 +27,8 @@ from sensor_msgs.msg import Image
 
 from robot_formation import conversions
 from robot_formation.components.base import Place
-from robot_formation.components.block_detector import BlockDetectorComponent, BlockDetectorNodeParameters
+from robot_formation.components.block_detector import BlockDetectorComponent
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.errors import FormationError
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters

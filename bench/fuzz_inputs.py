@@ -65,8 +65,8 @@ def use_scenario(words):
         found = scenarios.override(found, settings)
         found.check()
         for kind, robot in found.hosts():
-            found.robot_parameters(kind.name, robot)
-        json.dumps({kind: found.parameters(kind) for kind in found.sections}, allow_nan=False)
+            found.of_robot(kind, robot)
+        json.dumps(found.by_node(), allow_nan=False)
     except FormationError as error:
         print(f"formation scenario: {error}", file=sys.stderr)
         return 2

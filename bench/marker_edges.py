@@ -29,7 +29,7 @@ from robot_formation.alignment.precise.marker_edges import (
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
 from robot_formation.calibration.alignment_trial import FOLLOWER, Start, poses
 from robot_formation.vision.pixy2.detector import BlockDetector
-from robot_formation.world import WorldError
+from robot_formation.world.checks import WorldError
 from robot_formation.world.events import Frame
 from robot_formation.world.world import World
 

@@ -16,11 +16,11 @@ from robot_formation.calibration.motor_moves import calibrate_robot
 from robot_formation.calibration.rig import CalibrationRig, RobotOnRig
 from robot_formation.drive.curves import calibrated
 from robot_formation.drive.movement_system import CalibrationParameters, Drive, DriveParameters
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
-from robot_formation.world import WorldParameters
+from robot_formation.world.parameters import WorldParameters
 
 STEP_M = 0.05
 TOLERANCE_MM = 1.0

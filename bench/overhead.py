@@ -15,9 +15,10 @@ from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
 from robot_formation.surface import make_surface
-from robot_formation.vision.overhead.dot_tracking import CALIBRATIONS
-from robot_formation.world import WorldParameters, pose_on_surface
+from robot_formation.vision.overhead.dot_tracking import UsedCalibration
 from robot_formation.world.overhead import OverheadCamera
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
 
 TRACKS = ("one", "one_baseline", "two", "two_baseline")
 CM = 100.0
@@ -56,7 +57,7 @@ def main():
     print(f"overhead error in cm, {arguments.seeds} seeds: RMS, and largest of a run (least and greatest of the runs)")
     print(f"{'track':14s}{'calibration':13s}{'pictures':>9s}   {'leader':>20s}   {'follower_1':>20s}")
     for track in TRACKS:
-        for calibration in CALIBRATIONS:
+        for calibration in UsedCalibration:
             runs = [errors_of(track, seed, calibration) for seed in range(arguments.seeds)]
             cells = []
             for robot in ("leader", "follower_1"):

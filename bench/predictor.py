@@ -15,7 +15,7 @@ import time
 import numpy as np
 from odmd import OnlineDMD
 
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.koopman.predictors import NAMES, Predictor, PredictorParameters
 from robot_formation.parameters import from_mapping
 

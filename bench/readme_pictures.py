@@ -29,7 +29,10 @@ from robot_formation.vision.aruco_detector import TagDetector
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.signatures import load_signatures
-from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
+from robot_formation.world.camera import Camera
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
+from robot_formation.world.sensor import Sensor
 
 PICTURES = Path(__file__).parent.parent / "docs" / "pictures"
 SEED = 3

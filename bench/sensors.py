@@ -30,16 +30,20 @@ from robot_formation.alignment.paper_rules import TARGET
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.sweep_summary import median_with_interval
 from robot_formation.cli.sweep import seeds
-from robot_formation.components.block_detector import BlockDetectorNodeParameters
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.experiment.sweep import CONDITIONS
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
 from robot_formation.vision.aruco_detector import TagDetector
 from robot_formation.vision.aruco_patterns import Face
 from robot_formation.vision.pixy2.detector import BlockDetector
-from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
+from robot_formation.world.camera import Camera
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
+from robot_formation.world.sensor import Sensor
 from robot_formation.world.tag_faces import FACES
 
 KINDS = ("colours", "tags")
@@ -70,7 +74,7 @@ class Eye:
         values = {"marker": {"kind": kind}, "camera": camera}
         self.world = from_mapping(WorldParameters, values, where="bench")
         self.camera = Camera(PLANE, self.world)
-        parameters = from_mapping(BlockDetectorNodeParameters, scenarios.node_defaults("block_detector"), where="bench")
+        parameters = from_mapping(BlockDetectorNodeParameters, node_defaults("block_detector"), where="bench")
         tags = kind == "tags"
         self.detector = (
             TagDetector(parameters.tags, parameters) if tags else BlockDetector(parameters.load(), parameters)

@@ -9,12 +9,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from robot_formation.components.world import WorldNodeParameters
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.components.node_parameters import WorldNodeParameters
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.parameters import from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.vision.pixy2.signatures import save_signatures, teach_region
-from robot_formation.world import marker_picture
+from robot_formation.world.marker_picture import marker_picture
 
 FACES = ("target", "front", "rear")
 REGION = (136, 32, 44, 44)

@@ -21,9 +21,14 @@ import numpy as np
 
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
-from robot_formation.world import Camera, RobotStart, Sensor, World, WorldParameters, pose_on_surface
 from robot_formation.world.bullet import pybullet
+from robot_formation.world.camera import Camera
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
 from robot_formation.world.scene import PEDESTAL_M, Scene
+from robot_formation.world.sensor import Sensor
+from robot_formation.world.start import RobotStart
+from robot_formation.world.world import World
 
 ROBOTS = (1, 2, 5, 10)
 CALLS = 10

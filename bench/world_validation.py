@@ -14,7 +14,10 @@ from robot_formation.drive.movement_system import Drive, DriveParameters
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import SURFACES, make_surface
-from robot_formation.world import JointStates, RobotStart, World, WorldParameters
+from robot_formation.world.events import JointStates
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.start import RobotStart
+from robot_formation.world.world import World
 
 RADIUS_M, LEVER_M = 0.030, 0.205
 MOVES = {"v 20 cm": (0.2, 0, 0), "u 10 cm": (0, 0.1, 0), "diagonal 14 cm": (0.1, 0.1, 0), "turn 0.6 rad": (0, 0, 0.6)}

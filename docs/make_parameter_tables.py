@@ -1,4 +1,4 @@
-"""Rewrites the parameter tables of the node pages from the dataclasses that declare the parameters.
+"""Rewrites the parameter tables of the node pages, and the schema of scenario files, from the parameters' dataclasses.
 
 The table of a page, and below it what can be set while the node runs, stand between the comments <!-- parameters -->
 and <!-- /parameters -->.
@@ -9,6 +9,7 @@ Run: python docs/make_parameter_tables.py [--check]
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import sys
 from collections.abc import Mapping
@@ -17,13 +18,15 @@ from typing import Any
 
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.experiment.node_defaults import node_defaults
+from robot_formation.experiment.scenario_schema import scenario_schema
 from robot_formation.nodes.host.ros_parameters import AT_START, HostParameters, reasons
 from robot_formation.nodes.player.player_node import PlayerNode, PlayerParameters
 from robot_formation.nodes.progress.progress_node import Executable, ProgressParameters
 from robot_formation.nodes.recorder.recorder_node import RecorderNode, RecorderParameters
 from robot_formation.parameters import Spec, specs
 
+SCHEMA = Path(__file__).parents[1] / "config" / "scenario.schema.json"
 PAGES = Path(__file__).parent / "nodes"
 COMMON = "common"
 HEAD = "| name | type | unit | default | range | description |\n|---|---|---|---|---|---|"
@@ -49,8 +52,7 @@ def parameter_classes() -> dict[str, type]:
 def fixed_parameters(name: str) -> Mapping[str, str]:
     """List why parameters of a page can't be set while the node runs, by shell pattern."""
     if name in KINDS:
-        fixed: Mapping[str, str] = KINDS[name].component_class().fixed
-        return fixed
+        return KINDS[name].component_class().fixed
     others = {"recorder": RecorderNode.fixed, "player": PlayerNode.fixed, "progress": Executable.fixed}
     return {**others, COMMON: {"*": AT_START}}[name]
 
@@ -92,8 +94,8 @@ def updated(name: str, parameters: type) -> tuple[str, str]:
     )
 
 
-def _row(spec: Spec, configured: dict[str, Any]) -> str:
-    default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
+def _row(spec: Spec, configured: dict[str, object]) -> str:
+    default = spec.plain_default()
     said = _value(default)
     if spec.name in configured and configured[spec.name] != default:
         said += f"; {_value(configured[spec.name])} in config"
@@ -122,7 +124,7 @@ def _range(spec: Spec) -> str:
 
 
 def main() -> int:
-    """Rewrite the tables, or with --check only tell which pages are out of date (exit code 1)."""
+    """Rewrite the tables, or with --check only tell what is out of date (exit code 1)."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 if a table is out of date")
     check = parser.parse_args().check
@@ -133,6 +135,11 @@ def main() -> int:
             stale.append(name)
             if not check:
                 (PAGES / f"{name}.md").write_text(after, encoding="utf-8")
+    schema = json.dumps(scenario_schema(), indent=1) + "\n"
+    if not SCHEMA.exists() or SCHEMA.read_text(encoding="utf-8") != schema:
+        stale.append(SCHEMA.name)
+        if not check:
+            SCHEMA.write_text(schema, encoding="utf-8")
     print(f"{'out of date' if check else 'rewritten'}: {', '.join(stale) or 'none'}")
     return 1 if check and stale else 0
 

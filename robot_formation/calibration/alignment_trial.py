@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from robot_formation import names
 from robot_formation.alignment.precise.motion_planner import count_legs
-from robot_formation.components.block_detector import BlockDetectorNodeParameters
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.drive.movement_system import Drive, DriveParameters
 from robot_formation.follower.alignment_state import AlignmentState, State
 from robot_formation.follower.fine_tuning import (
@@ -30,7 +30,7 @@ from robot_formation.vision.pixy2.picture import Picture
 from robot_formation.world.events import Frame, JointStates, RobotPose
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
-from robot_formation.world.robot import RobotStart
+from robot_formation.world.start import RobotStart
 from robot_formation.world.world import World
 
 FOLLOWER = names.follower(1)

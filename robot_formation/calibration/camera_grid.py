@@ -18,14 +18,15 @@ from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.calibration.alignment_trial import FOLLOWER, Start, gap_m, poses
 from robot_formation.calibration.camera_edge_bias import Corners
 from robot_formation.calibration.camera_samples import CameraSample
-from robot_formation.components.block_detector import BlockDetectorNodeParameters
-from robot_formation.components.world import WorldNodeParameters
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters, WorldNodeParameters
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.follower.fine_tuning import LookParameters
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.picture import scaled
-from robot_formation.world import Camera, Pose, Sensor
+from robot_formation.world.camera import Camera
+from robot_formation.world.pose import Pose
+from robot_formation.world.sensor import Sensor
 
 REACH_M = 0.45
 ANGLES_DEG = (-60.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0)

@@ -19,8 +19,8 @@ from robot_formation.calibration.camera_grid import Conditions, Position, measur
 from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.parameters import to_mapping
-from robot_formation.world import Pose
 from robot_formation.world.description import robot_description
+from robot_formation.world.pose import Pose
 
 BAG_NAME = "vision_bag"
 _NS = 10**9

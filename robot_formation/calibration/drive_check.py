@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from robot_formation.components.world import WorldNodeParameters
+from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.drive.curves import CalibrationError, Curve, calibrated, load_calibration
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.parameters import to_mapping

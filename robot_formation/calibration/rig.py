@@ -19,7 +19,7 @@ from robot_formation.surface import Surface
 from robot_formation.world.events import JointStates
 from robot_formation.world.imperfections import generator
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.robot import RobotStart
+from robot_formation.world.start import RobotStart
 from robot_formation.world.world import World
 
 LEGS = {"v": "x", "u": "y", "turn": "yaw"}

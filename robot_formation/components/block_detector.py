@@ -6,51 +6,22 @@ import itertools
 import statistics
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar
 
 import cv2
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.marker import MarkerKind
-from robot_formation.parameters import parameter
-from robot_formation.paths import config_dir
-from robot_formation.vision.aruco_detector import BlockSensor, TagDetector, TagParameters
+from robot_formation.vision.aruco_detector import BlockSensor, TagDetector
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.detector import BlockDetector
-from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, Picture, scaled
-from robot_formation.vision.pixy2.signatures import Signature, load_signatures
 
 _RATE_FRAMES = 31
 _WHITE = (255, 255, 255)
-
-
-@dataclass(frozen=True)
-class BlockDetectorNodeParameters(DetectorParameters):
-    """The camera's own parameters, where its taught signatures are stored, and the search for tags instead."""
-
-    sensor: MarkerKind = parameter(
-        MarkerKind.COLOURS,
-        "What is looked for; colours: blocks of the taught colours; tags: the ArUco tags of a marker of that kind",
-    )
-
-    signatures_file: str = parameter(
-        "", "YAML or JSON file of taught signatures; empty: config/signatures.yaml, taught under the world's light"
-    )
-
-    tags: TagParameters = TagParameters()
-
-    def load(self) -> list[Signature]:
-        """Read the taught signatures.
-
-        Raises:
-            SignatureError: if the file can't be read or holds no signatures.
-        """
-        return load_signatures(Path(self.signatures_file) if self.signatures_file else config_dir() / "signatures.yaml")
 
 
 class BlockDetectorComponent(Component):

@@ -11,10 +11,12 @@ from robot_formation.components.base import Component, Place
 from robot_formation.parameters import Choice
 
 if TYPE_CHECKING:
-    from robot_formation.components.block_detector import BlockDetectorNodeParameters
-    from robot_formation.components.fine_tuner import FineTunerNodeParameters
-    from robot_formation.components.overhead_tracker import OverheadTrackerNodeParameters
-    from robot_formation.components.world import WorldNodeParameters
+    from robot_formation.components.node_parameters import (
+        BlockDetectorNodeParameters,
+        FineTunerNodeParameters,
+        OverheadTrackerNodeParameters,
+        WorldNodeParameters,
+    )
     from robot_formation.drive.movement_system import DriveParameters
     from robot_formation.koopman.predictors import PredictorParameters
     from robot_formation.leader.leader_motion import LeaderParameters
@@ -81,13 +83,15 @@ class NodeKind(Generic[P]):
 
 
 def _world() -> Classes[WorldNodeParameters]:
-    from robot_formation.components.world import WorldComponent, WorldNodeParameters
+    from robot_formation.components.node_parameters import WorldNodeParameters
+    from robot_formation.components.world import WorldComponent
 
     return WorldNodeParameters, WorldComponent
 
 
 def _overhead_tracker() -> Classes[OverheadTrackerNodeParameters]:
-    from robot_formation.components.overhead_tracker import OverheadTrackerComponent, OverheadTrackerNodeParameters
+    from robot_formation.components.node_parameters import OverheadTrackerNodeParameters
+    from robot_formation.components.overhead_tracker import OverheadTrackerComponent
 
     return OverheadTrackerNodeParameters, OverheadTrackerComponent
 
@@ -100,7 +104,8 @@ def _drive() -> Classes[DriveParameters]:
 
 
 def _block_detector() -> Classes[BlockDetectorNodeParameters]:
-    from robot_formation.components.block_detector import BlockDetectorComponent, BlockDetectorNodeParameters
+    from robot_formation.components.block_detector import BlockDetectorComponent
+    from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 
     return BlockDetectorNodeParameters, BlockDetectorComponent
 
@@ -113,7 +118,8 @@ def _predictor() -> Classes[PredictorParameters]:
 
 
 def _fine_tuner() -> Classes[FineTunerNodeParameters]:
-    from robot_formation.components.fine_tuner import FineTunerComponent, FineTunerNodeParameters
+    from robot_formation.components.fine_tuner import FineTunerComponent
+    from robot_formation.components.node_parameters import FineTunerNodeParameters
 
     return FineTunerNodeParameters, FineTunerComponent
 

@@ -3,28 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.components.node_parameters import FineTunerNodeParameters
 from robot_formation.follower import fine_tuning as core
 from robot_formation.follower.alignment_state import State
 from robot_formation.follower.camera_calibration_file import calibrated
 from robot_formation.geometry.se2 import Motion
-from robot_formation.parameters import parameter
-
-
-@dataclass(frozen=True)
-class FineTunerNodeParameters(core.FineTunerParameters):
-    """The fine-tuner's parameters and who listens to its tick."""
-
-    done_listeners: int = parameter(
-        1,
-        "Nodes that wait for this follower's tick: the leader, and the follower behind if there is one",
-        low=0,
-        high=2,
-    )
 
 
 class FineTunerComponent(Component):

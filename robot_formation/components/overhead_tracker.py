@@ -3,46 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.components.node_parameters import OverheadTrackerNodeParameters
 from robot_formation.components.trail import Trail
-from robot_formation.parameters import ParameterError, parameter
-from robot_formation.surface import SURFACES, Surface, surface_from_texts
-from robot_formation.vision.overhead.dot_tracking import OverheadTracker, OverheadTrackingParameters
-
-
-@dataclass(frozen=True)
-class OverheadTrackerNodeParameters(OverheadTrackingParameters):
-    """The tracker's own parameters, which robots there are, where they start, and the ground as far as it is known."""
-
-    robots: tuple[str, ...] = parameter(("leader", "follower_1"), "Names of the robots, in the order of the poses")
-    start_x_m: tuple[float, ...] = parameter(
-        (0.76, 1.08), "Start of each robot's base_link in the world", unit="m", low=-10.0, high=100.0
-    )
-    start_y_m: tuple[float, ...] = parameter(
-        (0.16, 0.16), "Start of each robot's base_link in the world", unit="m", low=-10.0, high=100.0
-    )
-    surface: str = parameter(
-        "bowl", "Name of the surface that a calibration with knows_surface means", known=tuple(SURFACES)
-    )
-    surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
-
-    def __post_init__(self) -> None:
-        """Check that every robot has a start."""
-        lengths = {len(self.start_x_m), len(self.start_y_m), len(self.robots)}
-        if len(lengths) != 1 or len(set(self.robots)) != len(self.robots):
-            raise ParameterError("overhead_tracker: 'robots' must differ and have one start_x_m and start_y_m each")
-
-    def starts(self) -> dict[str, tuple[float, float]]:
-        """List where each robot begins: x and y in the world, metres."""
-        return dict(zip(self.robots, zip(self.start_x_m, self.start_y_m, strict=True), strict=True))
-
-    def make_surface(self) -> Surface:
-        """Build the surface that the parameters name."""
-        return surface_from_texts(self.surface, self.surface_parameters)
+from robot_formation.vision.overhead.dot_tracking import OverheadTracker
 
 
 class OverheadTrackerComponent(Component):

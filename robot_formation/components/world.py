@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
@@ -12,64 +11,16 @@ from numpy.typing import NDArray
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
+from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.components.overhead_view import OverheadView
 from robot_formation.components.trail import Trail
 from robot_formation.errors import FormationError
-from robot_formation.parameters import ParameterError, parameter
-from robot_formation.surface import SURFACES, Surface, surface_from_texts
-from robot_formation.world.checks import check_setup
+from robot_formation.surface import Surface
 from robot_formation.world.description import robot_description
 from robot_formation.world.events import Event, Frame, JointStates, LeftPlate, RobotPose
-from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.robot import RobotStart
 from robot_formation.world.world import World
 
 _MESH_CELLS = 40
-
-
-@dataclass(frozen=True)
-class WorldNodeParameters(WorldParameters):
-    """The world's parameters, its surface, its robots and where they start."""
-
-    seed: int = parameter(0, "Seed of every random stream", low=0, high=2**63 - 1)
-    surface: str = parameter("bowl", "Name of the surface", known=tuple(SURFACES))
-    surface_parameters: tuple[str, ...] = parameter((), "The surface's own parameters, each as 'name=value'")
-    robots: tuple[str, ...] = parameter(("leader", "follower_1"), "Names of the robots; followers carry a camera")
-    start_x_m: tuple[float, ...] = parameter((0.76, 1.08), "Start of each robot's base_link in the world", unit="m")
-    start_y_m: tuple[float, ...] = parameter((0.16, 0.16), "Start of each robot's base_link in the world", unit="m")
-    start_heading_rad: tuple[float, ...] = parameter((1.5707963, 1.5707963), "Start headings", unit="rad")
-    real_time_factor: float = parameter(
-        0.0, "Simulated seconds per wall second; 0 is as fast as possible", low=0.0, high=1000.0
-    )
-    leaving_ends_run: bool = parameter(
-        True, "End with exit code 3 when a robot's reference dot leaves the plate; false: only hold the robot there"
-    )
-
-    def __post_init__(self) -> None:
-        """Check that every robot has a start."""
-        super().__post_init__()
-        lengths = {len(self.start_x_m), len(self.start_y_m), len(self.start_heading_rad), len(self.robots)}
-        if len(lengths) != 1 or len(set(self.robots)) != len(self.robots):
-            raise ParameterError(
-                "world: 'robots' must differ and have one start_x_m, start_y_m and start_heading_rad each"
-            )
-
-    def starts(self) -> list[RobotStart]:
-        """List the robots with their start poses."""
-        poses = zip(self.robots, self.start_x_m, self.start_y_m, self.start_heading_rad, strict=True)
-        return [RobotStart(name, x, y, heading, camera=name != names.LEADER) for name, x, y, heading in poses]
-
-    def make_surface(self) -> Surface:
-        """Build the surface that the parameters name."""
-        return surface_from_texts(self.surface, self.surface_parameters)
-
-    def check(self) -> None:
-        """Check the surface and the starts on it, as far as that can be done without a world.
-
-        Raises:
-            FormationError: on a surface that can't be made, or a robot that would start beyond the plate.
-        """
-        check_setup(self.make_surface(), self.starts(), self, self.seed)
 
 
 class WorldComponent(Component):

@@ -11,11 +11,13 @@ from typing import TypeVar
 from robot_formation import names
 from robot_formation.calibration.camera_check import check_camera
 from robot_formation.calibration.drive_check import check_curves
-from robot_formation.components.block_detector import BlockDetectorNodeParameters
 from robot_formation.components.catalogue import KINDS, NodeKind
-from robot_formation.components.fine_tuner import FineTunerNodeParameters
-from robot_formation.components.overhead_tracker import OverheadTrackerNodeParameters
-from robot_formation.components.world import WorldNodeParameters
+from robot_formation.components.node_parameters import (
+    BlockDetectorNodeParameters,
+    FineTunerNodeParameters,
+    OverheadTrackerNodeParameters,
+    WorldNodeParameters,
+)
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
@@ -41,8 +43,8 @@ P = TypeVar("P")
 Settings = Mapping[str, Mapping[str, object]]
 """Parameters that differ from config/: by node, then by dotted name."""
 
-# Parameters that follow from the setup, and what to set instead.
-_FIXED = {
+
+FOLLOWS_FROM_SETUP = {
     "world": {
         "marker.kind": "'marker'",
         "seed": "'seed'",
@@ -55,6 +57,7 @@ _FIXED = {
     "leader": {"followers": "'followers'"},
     "fine_tuner": {"done_listeners": "'followers'"},
 }
+"""Parameters of nodes that follow from the setup, and what is set instead."""
 
 
 @dataclass(frozen=True)
@@ -233,8 +236,10 @@ def load(path: Path) -> Scenario:
 
 def _checked(kind: str, section: Mapping[str, object], *, where: str) -> dict[str, object]:
     for name in section:
-        if name in _FIXED.get(kind, {}):
-            raise ParameterError(f"{where}: '{name}' follows from the scenario; set {_FIXED[kind][name]} instead")
+        if name in FOLLOWS_FROM_SETUP.get(kind, {}):
+            raise ParameterError(
+                f"{where}: '{name}' follows from the scenario; set {FOLLOWS_FROM_SETUP[kind][name]} instead"
+            )
     checked = to_mapping(from_mapping(KINDS[kind].parameter_class(), {**node_defaults(kind), **section}, where=where))
     return {name: checked[name] for name in section}
 

@@ -10,7 +10,7 @@ from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
 from robot_formation.world.parameters import MotorParameters, WorldParameters
 from robot_formation.world.pose import off_plate
-from robot_formation.world.robot import RobotStart
+from robot_formation.world.start import RobotStart
 
 WHEELS = 4
 

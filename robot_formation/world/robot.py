@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from robot_formation.geometry.orientation import quaternion
@@ -13,30 +12,13 @@ from robot_formation.world.body import Body
 from robot_formation.world.events import JOINT_NAMES, JointStates
 from robot_formation.world.imperfections import draw_imperfections, generator
 from robot_formation.world.parameters import DriveMode, WorldParameters
-from robot_formation.world.pose import Pose, pose_on_surface
+from robot_formation.world.pose import Pose
+from robot_formation.world.start import RobotStart
 from robot_formation.world.wheel import HELD
 
 SETTLING_ROUNDS = 4
 
 _CHANGING = ("moving", "disturbed", "awake", "timed_out", "held", "_steps_moving", "_steps_resting")
-
-
-@dataclass(frozen=True)
-class RobotStart:
-    """Where a robot stands at time 0: name, base_link in the world (m, rad), and whether it carries a camera."""
-
-    name: str
-    x_m: float
-    y_m: float
-    heading_rad: float
-    camera: bool = True
-
-    def pose(self, surface: Surface, parameters: WorldParameters) -> Pose:
-        """Pose of base_link with all wheels on the surface."""
-        wheels = parameters.wheels
-        return pose_on_surface(
-            surface, self.x_m, self.y_m, self.heading_rad, wheelbase_m=wheels.wheelbase_m, track_m=wheels.track_m
-        )
 
 
 class Robot:

@@ -13,8 +13,9 @@ from robot_formation.world.checks import Command, WorldError, check_command, che
 from robot_formation.world.events import BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import CameraMode, WorldParameters
 from robot_formation.world.pose import Pose, off_plate
-from robot_formation.world.robot import Robot, RobotStart
+from robot_formation.world.robot import Robot
 from robot_formation.world.sensor import Development, Sensor
+from robot_formation.world.start import RobotStart
 from robot_formation.world.state import WorldState, restore_physics, save_physics
 
 MAX_FRAMES_OWED = 600

@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 
 from robot_formation.alignment.paper_rules import TARGET, AlignmentParameters
-from robot_formation.components.world import WorldNodeParameters
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.components.node_parameters import WorldNodeParameters
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.parameters import from_mapping, specs
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.signatures import load_signatures, teach_region
-from robot_formation.world import Camera, Sensor, marker_picture, pose_on_surface
+from robot_formation.world.camera import Camera
+from robot_formation.world.marker_picture import marker_picture
+from robot_formation.world.pose import pose_on_surface
+from robot_formation.world.sensor import Sensor
 
 WORLD = from_mapping(WorldNodeParameters, node_defaults("world"), where="config/world.yaml")
 FACE = np.array([[x, -0.03, z] for x in (-0.03, 0.03) for z in (0.156, 0.216)])

@@ -13,8 +13,8 @@ from robot_formation.bag.reader import read_bag
 from robot_formation.bag.transforms import Transforms
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.launching.processes import run_metadata
-from robot_formation.world import WorldParameters
 from robot_formation.world.description import robot_description
+from robot_formation.world.parameters import WorldParameters
 from synthetic_bag import STORE, odometry, text
 
 ODOMETRY, STRING = "nav_msgs/msg/Odometry", "std_msgs/msg/String"

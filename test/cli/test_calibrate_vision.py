@@ -17,9 +17,9 @@ from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.bag.reader import read_bag
 from robot_formation.calibration import camera_run, camera_table
 from robot_formation.calibration.camera_grid import ANGLES_DEG, Position, measure, positions, true_faces
-from robot_formation.calibration.camera_run import conditions_of
 from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.calibration.camera_table import COLUMNS, VisionTable, read_table
+from robot_formation.cli.calibrate_vision import conditions_of
 from robot_formation.cli.main import main
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.experiment.scenario import load_track, override
@@ -257,7 +257,7 @@ def test_a_camera_that_never_sees_the_marker_keeps_its_table_and_says_what_is_mi
 
 
 def test_the_record_names_what_results_depend_on_and_nothing_else():
-    record = camera_run.record_of(load_track("two"), 0.05)
+    record = camera_run.record_of(conditions_of(load_track("two")), 0.05)
     assert {"seed", "step_m", "world.surface", "world.camera.gamma", "block_detector.block_filtering"} <= set(record)
     assert not [name for name in record if name.startswith(("world.motor", "fine_tuner.alignment"))]
     assert camera_table.RECORD_NAME == "vision.json"

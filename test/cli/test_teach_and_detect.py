@@ -10,12 +10,13 @@ import yaml
 
 from robot_formation.cli import detect, teach
 from robot_formation.errors import FormationError
+from robot_formation.marker import MarkerKind
 from robot_formation.parameters import specs, to_mapping
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture_files import CAMERA_PARAMETERS, read_parameters
 from robot_formation.vision.pixy2.signatures import load_signatures, save_signatures
-from robot_formation.world import WorldParameters, marker_picture
-from robot_formation.world.parameters import CameraParameters, MarkerParameters
+from robot_formation.world.marker_picture import marker_picture
+from robot_formation.world.parameters import CameraParameters, MarkerParameters, WorldParameters
 from tag_helpers import needs_tags
 from vision_helpers import DATA, EXAMPLES, GROUPS, PARAMETERS, canvas, picture
 
@@ -258,7 +259,7 @@ def test_wrong_usage_ends_with_exit_code_2(words, capsys):
 
 @needs_tags
 def test_detect_finds_the_faces_of_a_marker_of_tags_without_signatures(files, capsys):
-    world = WorldParameters(marker=MarkerParameters(kind="tags"))
+    world = WorldParameters(marker=MarkerParameters(kind=MarkerKind.TAGS))
     images = [write_png(files / f"{face}.png", marker_picture(world, face)) for face in ("target", "front", "rear")]
     assert formation("detect", *images, "--sensor", "tags", "--json") == 0
     found = [entry["blocks"] for entry in json.loads(capsys.readouterr().out)]

@@ -6,17 +6,22 @@ import pytest
 from component_helpers import wired
 from robot_formation import conversions
 from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET, bounding_boxes
-from robot_formation.components.block_detector import BlockDetectorNodeParameters
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
-from robot_formation.experiment.scenario import load, load_track, node_defaults, override
+from robot_formation.experiment.node_defaults import node_defaults, parameter_file
+from robot_formation.experiment.scenario import load, load_track, override
+from robot_formation.marker import MarkerKind
 from robot_formation.parameters import ParameterError, flatten, from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
 from robot_formation.vision.aruco_patterns import Face
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.picture import PictureError
-from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
+from robot_formation.world.camera import Camera
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
+from robot_formation.world.sensor import Sensor
 from tag_helpers import needs_tags
 
 PLANE = make_surface("plane")
@@ -189,20 +194,19 @@ def test_a_tag_detector_reads_no_signatures(tmp_path):
 def test_the_scenarios_marker_sets_the_world_the_sensor_and_the_calibration():
     scenario = override(load_track("two"), ["marker=tags"])
     scenario.check()
-    assert scenario.parameters("world")["marker.kind"] == scenario.parameters("block_detector")["sensor"] == "tags"
-    assert scenario.parameters("fine_tuner")["alignment.side_bias_px"] != 2.65
-    assert scenario.parameters("drive") == load_track("two").parameters("drive")
-    for kind in ("world", "block_detector", "fine_tuner"):
-        assert override(scenario, ["marker=colours"]).parameters(kind) == load_track("two").parameters(kind)
+    assert scenario.world.marker.kind is scenario.block_detector.sensor is MarkerKind.TAGS
+    assert scenario.fine_tuner.alignment.side_bias_px != 2.65
+    assert scenario.drive == load_track("two").drive
+    assert override(scenario, ["marker=colours"]) == load_track("two")
 
 
 def test_what_a_scenario_says_comes_after_the_tags_calibration(tmp_path):
     scenario = override(load_track("one"), ["marker=tags", "fine_tuner.alignment.side_bias_px=1.5"])
-    assert scenario.parameters("fine_tuner")["alignment.side_bias_px"] == 1.5
+    assert scenario.fine_tuner.alignment.side_bias_px == 1.5
     path = tmp_path / "mine.yaml"
     path.write_text("marker: tags\nblock_detector: {tags: {window_px: 15}}\n", encoding="utf-8")
-    found = load(path).parameters("block_detector")
-    assert (found["sensor"], found["tags.window_px"], found["block_filtering"]) == ("tags", 15, 40)
+    found = load(path).block_detector
+    assert (found.sensor, found.tags.window_px, found.block_filtering) == (MarkerKind.TAGS, 15, 40)
 
 
 @pytest.mark.parametrize("setting", ["world.marker.kind=tags", "block_detector.sensor=tags", "marker=tag"])
@@ -217,8 +221,8 @@ def test_the_files_for_tags_differ_from_config_and_hold_known_parameters():
     assert [file.stem for file in files] == ["block_detector", "fine_tuner", "world"]
     scenario = override(load_track("two"), ["marker=tags"])
     for file in files:
-        defaults, values = node_defaults(file.stem), scenario.parameters(file.stem)
-        assert any(values[name] != value for name, value in defaults.items() if name in values)
+        colours, tags = load_track("two").by_node()[file.stem], scenario.by_node()[file.stem]
+        assert {name for name in tags if tags[name] != colours[name]} == set(parameter_file(file))
 
 
 @needs_tags

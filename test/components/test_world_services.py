@@ -8,9 +8,10 @@ from sensor_msgs.msg import JointState
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Place
-from robot_formation.components.block_detector import BlockDetectorComponent, BlockDetectorNodeParameters
+from robot_formation.components.block_detector import BlockDetectorComponent
 from robot_formation.components.drive import DriveComponent
-from robot_formation.components.world import WorldComponent, WorldNodeParameters
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters, WorldNodeParameters
+from robot_formation.components.world import WorldComponent
 from robot_formation.drive.movement_system import WHEELS, DriveParameters, WheelCommand
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_process import run_in_process

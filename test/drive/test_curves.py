@@ -85,7 +85,9 @@ def test_a_robot_that_the_file_lacks_is_refused(file):
 
 def test_robots_of_another_seed_or_make_are_refused_by_name(tmp_path):
     path = tmp_path / "motors.yaml"
-    save_calibration(path, MotorCalibration(CURVES, {"surface": "plane", **robot_facts(load_track("two"))}))
+    robots = load_track("two")
+    facts = {"surface": "plane", **robot_facts(robots.drive, robots.world)}
+    save_calibration(path, MotorCalibration(CURVES, facts))
     scenario(path).check()
     scenario(path, "predictor.name=previous", "world.surface=bowl", "world.camera.mode=on_demand").check()
     for setting, words in (
@@ -108,11 +110,11 @@ def test_a_file_that_does_not_say_how_it_was_measured_is_taken_for_any_robots(tm
 def test_a_run_says_and_records_which_curves_it_uses(file):
     import json
 
-    assert describe_curves(scenario(file)) == f"drive curves: {file}, measured with seed 0, surface plane"
-    assert "drive.calibration" in describe_curves(load_track("two"))
+    assert describe_curves(scenario(file).drive) == f"drive curves: {file}, measured with seed 0, surface plane"
+    assert "drive.calibration" in describe_curves(load_track("two").drive)
     recorded = json.loads(run_metadata(scenario(file))["drive_curves"])
     assert recorded["leader"]["v"] == [-0.1, 35.0]
-    assert recorded == json.loads(json.dumps(robot_curves(scenario(file))))
+    assert recorded == json.loads(json.dumps(robot_curves(scenario(file).drive, scenario(file).robots)))
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ CASES = {
 @pytest.mark.parametrize("settings", CASES.values(), ids=CASES)
 def test_the_analysis_is_that_of_the_bag_of_the_same_run(tmp_path, settings):
     scenario = override(load_track("one"), [*BASE, *settings])
-    details = {"scenario": scenario.setup.name, "timesteps": str(scenario.parameters("leader")["timesteps"])}
+    details = {"scenario": scenario.setup.name, "timesteps": str(scenario.leader.timesteps)}
     result = run_in_process(scenario, tmp_path / "bag", details)
     recorded = load_run(tmp_path / "bag")
     record = run_in_memory(scenario)

@@ -8,13 +8,11 @@ import pytest
 from robot_formation import conversions
 from robot_formation.alignment.paper_rules import AlignmentParameters
 from robot_formation.components.predictor import PredictorComponent
-from robot_formation.components.world import WorldNodeParameters
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.oracle import IdealRun, TargetFace
 from robot_formation.experiment.scenario import load_track, override, with_surface
 from robot_formation.experiment.sweep import Task, run_task
 from robot_formation.geometry.orientation import quaternion
-from robot_formation.parameters import from_mapping
 from robot_formation.world.camera import Camera
 from robot_formation.world.pose import Pose, pose_on_surface
 
@@ -33,7 +31,7 @@ def level(x_m, y_m, yaw_rad=0.0):
 @pytest.fixture(scope="module")
 def world():
     scenario = with_surface(load_track("two"), "plane")
-    return from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world")
+    return scenario.world
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +76,7 @@ def test_the_offset_points_from_the_robot_to_its_place(face):
 
 def test_on_a_bowl_too_the_offset_is_taken_from_all_corners_of_the_face(world, face):
     scenario = with_surface(load_track("two"), "bowl")
-    bowl = from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world").make_surface()
+    bowl = scenario.world.make_surface()
     robot, neighbour = pose_on_surface(bowl, 1.2, 0.5, 2.0), pose_on_surface(bowl, 0.95, 0.35, 2.05)
     edge_m, top = world.marker.edge_m, world.marker.top_m
     rotation, lens = robot.matrix(), np.array(robot.place((world.camera.x_m, world.camera.y_m, world.camera.z_m)))
@@ -156,7 +154,7 @@ def test_only_prediction_moves_from_timestep_4_on_are_replaced(closed):
 def test_a_move_ends_where_the_camera_would_show_no_offset(surface):
     story = Story("seed=1000", close=False, surface=surface)
     assert story.code == 0
-    world = from_mapping(WorldNodeParameters, story.scenario.parameters("world"), where="world")
+    world = story.scenario.world
     ground = world.make_surface()
     face = TargetFace(Camera(ground, world), world)
     poses, predicting, errors, checked = {}, False, [], 0

@@ -14,14 +14,16 @@ from robot_formation.analysis.from_bag import record_of as record_of_messages
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.report import text_report, to_json, write_pictures
 from robot_formation.components.base import Place
-from robot_formation.components.overhead_tracker import OverheadTrackerComponent, OverheadTrackerNodeParameters
+from robot_formation.components.node_parameters import OverheadTrackerNodeParameters
+from robot_formation.components.overhead_tracker import OverheadTrackerComponent
 from robot_formation.experiment.in_process import InProcessRun, run_in_process
 from robot_formation.experiment.scenario import override
 from robot_formation.launching.processes import run_metadata
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import make_surface
-from robot_formation.world import WorldParameters, pose_on_surface
 from robot_formation.world.overhead import OverheadCamera
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
 
 pytestmark = pytest.mark.slow
 
@@ -102,11 +104,11 @@ def test_a_run_without_tracker_has_no_overhead_error(tmp_path):
 
 def test_the_tracker_knows_robots_starts_and_ground_of_its_scenario():
     scenario = short_scenario("followers=2", "world.surface=plane", "world.surface_parameters=['height_m=0.1']")
-    world, tracker = scenario.parameters("world"), scenario.parameters("overhead_tracker")
+    world, tracker = scenario.world, scenario.overhead_tracker
     for name in ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters"):
-        assert tracker[name] == world[name]
+        assert getattr(tracker, name) == getattr(world, name)
     wrong = override(scenario, ["overhead_tracker.surface=bowl", "overhead_tracker.surface_parameters=[]"])
-    assert wrong.parameters("overhead_tracker")["surface"] == "bowl"
+    assert wrong.overhead_tracker.surface == "bowl"
 
 
 # --- the component ------------------------------------------------------------------------------------------------

@@ -54,11 +54,11 @@ def test_a_sample_is_a_whole_run_of_its_scenario(name):
     scenario = SAMPLES[name].scenario()
     figures = SCRIPT.analysis_of(FOLDER / name)
     assert figures["outcome"] == "done"
-    assert len(figures["timesteps"]) == scenario.parameters("leader")["timesteps"]
+    assert len(figures["timesteps"]) == scenario.leader.timesteps
     with read_bag(FOLDER / name) as bag:
         details = bag.metadata(METADATA_NAME)
     assert re.fullmatch("[0-9a-f]{40}", details["git_commit"]), "make it from a clean checkout"
-    assert details["predictor"] == scenario.parameters("predictor")["name"]
+    assert details["predictor"] == scenario.predictor.name
     assert json.loads(details["parameters"])["fine_tuner"]["mode"] == "paper"
 
 

@@ -1,29 +1,34 @@
 """Scenarios: presets that load, files that agree with the code, overrides, and one line for everything wrong."""
 
+import json
 import math
 import re
 
+import jsonschema
 import pytest
 import yaml
 
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
-from robot_formation.experiment import scenario as module
+from robot_formation.experiment import node_defaults as module
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.experiment.scenario import (
     Setup,
     load,
     load_track,
-    node_defaults,
     override,
     presets,
     track_names,
     with_option,
     with_surface,
 )
+from robot_formation.experiment.scenario_schema import scenario_schema
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.koopman.predictors import NAMES, PredictorParameters
 from robot_formation.parameters import from_mapping, specs, to_mapping
+from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
+from robot_formation.world.parameters import CameraMode
 
 # What a scenario's setup fixes, so that config/ need not (and must not) say it.
 FIXED = {
@@ -84,16 +89,16 @@ def test_tracks_start_where_the_papers_do(track, x_m, y_m, heading_deg, timestep
     found = load_track(track)
     setup = found.setup
     assert (setup.start_x_m, setup.start_y_m, setup.heading_deg) == (x_m, y_m, heading_deg)
-    leader = found.parameters("leader")
-    assert (leader["timesteps"], leader["step_m"]) == (timesteps, 0.05)
+    leader = found.leader
+    assert (leader.timesteps, leader.step_m) == (timesteps, 0.05)
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_config_files_hold_exactly_the_parameters_that_the_setup_does_not_fix(kind):
-    known = set(specs(KINDS[kind].parameter_class())) - FIXED.get(kind, set())
-    given = set(node_defaults(kind))
-    assert given - known == set(), "unknown keys"
-    assert known - given == set(), "missing keys"
+def test_config_files_hold_only_what_differs_from_the_code_and_what_the_setup_does_not_fix(kind):
+    defaults = to_mapping(KINDS[kind].parameter_class()())
+    given = node_defaults(kind)
+    assert not set(given) & FIXED.get(kind, set())
+    assert [name for name, value in given.items() if value == defaults[name]] == []
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
@@ -109,39 +114,50 @@ def test_config_files_hold_valid_values(kind):
     from_mapping(KINDS[kind].parameter_class(), node_defaults(kind), where=kind)
 
 
-@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"block_detector"}))
-def test_config_files_repeat_the_defaults_of_the_code(kind):
-    values = to_mapping(KINDS[kind].parameter_class()())
-    if kind == "world":
-        values["overhead.enabled"] = True  # a run is watched from above; a world of one's own need not be
-    assert {
-        name: pytest.approx(values[name]) if specs(KINDS[kind].parameter_class())[name].type is float else values[name]
-        for name in node_defaults(kind)
-    } == node_defaults(kind)
-
-
 def test_the_detector_is_tuned_as_in_the_paper():
-    found = node_defaults("block_detector")
-    assert found["signature_range"] == [5.0, 6.0, 6.0]
-    assert (found["block_filtering"], found["max_merge_dist"], found["min_block_area"]) == (40, 4, 20)
-    assert found["signature_teach_threshold"] == 5600
+    found = load_track("two").block_detector
+    assert found.signature_range == (5.0, 6.0, 6.0)
+    assert (found.block_filtering, found.max_merge_dist, found.min_block_area) == (40, 4, 20)
+    assert found.signature_teach_threshold == 5600
 
 
 def test_the_same_length_has_the_same_value_in_every_node(track_two):
-    world, drive, tuner, predictor = (track_two.parameters(k) for k in ("world", "drive", "fine_tuner", "predictor"))
-    assert drive["wheel_radius_m"] == world["wheels.radius_m"]
-    assert drive["wheel_lever_m"] == pytest.approx((world["wheels.wheelbase_m"] + world["wheels.track_m"]) / 2)
-    assert drive["encoder_radius_m"] == world["encoder_wheels.diameter_m"] / 2
-    assert drive["encoder_v_offset_m"] == world["encoder_wheels.v_wheel_y_m"]
-    assert drive["encoder_u_offset_m"] == world["encoder_wheels.u_wheel_x_m"]
-    assert drive["wheel_speed_rad_s"] <= world["motor.max_speed_rad_s"]
-    for name in ("max_u_m", "max_v_m"):
-        assert tuner[name] <= drive[name] == predictor[name]
-    assert tuner["alignment.max_v_step_m"] <= drive["max_v_m"]
-    assert tuner["alignment.max_u_step_m"] <= drive["max_u_m"]
-    assert tuner["first_step_m"] == track_two.parameters("leader")["step_m"]
-    lens_to_face = FORMATION_DISTANCE_M - world["marker.edge_m"] / 2 - world["camera.y_m"]
-    assert tuner["alignment.distance_m"] == pytest.approx(lens_to_face)
+    world, drive, tuner, predictor = track_two.world, track_two.drive, track_two.fine_tuner, track_two.predictor
+    assert drive.wheel_radius_m == world.wheels.radius_m
+    assert drive.wheel_lever_m == pytest.approx((world.wheels.wheelbase_m + world.wheels.track_m) / 2)
+    assert drive.encoder_radius_m == world.encoder_wheels.diameter_m / 2
+    assert drive.encoder_v_offset_m == world.encoder_wheels.v_wheel_y_m
+    assert drive.encoder_u_offset_m == world.encoder_wheels.u_wheel_x_m
+    assert drive.wheel_speed_rad_s <= world.motor.max_speed_rad_s
+    assert tuner.max_u_m <= drive.max_u_m == predictor.max_u_m
+    assert tuner.max_v_m <= drive.max_v_m == predictor.max_v_m
+    assert tuner.alignment.max_v_step_m <= drive.max_v_m
+    assert tuner.alignment.max_u_step_m <= drive.max_u_m
+    assert tuner.first_step_m == track_two.leader.step_m
+    lens_to_face = FORMATION_DISTANCE_M - world.marker.edge_m / 2 - world.camera.y_m
+    assert tuner.alignment.distance_m == pytest.approx(lens_to_face)
+
+
+def test_the_schema_of_scenario_files_takes_the_presets_and_refuses_what_load_refuses(write):
+    schema = json.loads((config_dir() / "scenario.schema.json").read_text(encoding="utf-8"))
+    assert schema == scenario_schema()
+    validator = jsonschema.Draft202012Validator(schema)
+    validator.check_schema(schema)
+    for path in presets().values():
+        assert not list(validator.iter_errors(yaml.safe_load(path.read_text(encoding="utf-8"))))
+    good = {"seed": 3, "marker": "tags", "world": {"camera": {"mode": "on_demand"}, "motor.drive_mode": "pid"}}
+    assert not list(validator.iter_errors(good))
+    for wrong in (
+        {"sead": 3},
+        {"seed": -1},
+        {"marker": "tag"},
+        {"predictor": {"nam": "measured"}},
+        {"world": {"camera": {"mode": "steam"}}},
+        {"world": {"robots": ["leader"]}},
+        {"block_detector": {"signature_range": ["wide"]}},
+    ):
+        assert list(validator.iter_errors(wrong)), wrong
+        one_line(load, write(yaml.safe_dump(wrong)))
 
 
 # --- the formation ----------------------------------------------------------------------------------------------------
@@ -153,22 +169,22 @@ def test_each_follower_starts_32_cm_to_the_right_of_its_neighbour_with_the_same_
     track_two, followers, heading_deg
 ):
     found = override(track_two, [f"followers={followers}", f"heading_deg={heading_deg}"])
-    world = found.parameters("world")
-    assert world["robots"] == ["leader", *(f"follower_{n}" for n in range(1, followers + 1))] == found.robots
-    assert world["start_heading_rad"] == pytest.approx([math.radians(heading_deg)] * (followers + 1))
+    world = found.world
+    assert list(world.robots) == ["leader", *(f"follower_{n}" for n in range(1, followers + 1))] == found.robots
+    assert world.start_heading_rad == pytest.approx((math.radians(heading_deg),) * (followers + 1))
     heading = math.radians(heading_deg)
     for n in range(followers):
-        dx = world["start_x_m"][n + 1] - world["start_x_m"][n]
-        dy = world["start_y_m"][n + 1] - world["start_y_m"][n]
+        dx = world.start_x_m[n + 1] - world.start_x_m[n]
+        dy = world.start_y_m[n + 1] - world.start_y_m[n]
         assert math.cos(heading) * dx + math.sin(heading) * dy == pytest.approx(0.0, abs=1e-12)  # nothing forward
         assert -math.sin(heading) * dx + math.cos(heading) * dy == pytest.approx(-0.32)  # to the right
-    assert (world["start_x_m"][0], world["start_y_m"][0]) == (1.412, 0.111)
+    assert (world.start_x_m[0], world.start_y_m[0]) == (1.412, 0.111)
 
 
 def test_the_leader_waits_for_every_follower_and_each_tick_has_its_listeners(track_two):
     found = override(track_two, ["followers=3"])
-    assert found.parameters("leader")["followers"] == ["follower_1", "follower_2", "follower_3"]
-    listeners = {robot: found.robot_parameters("fine_tuner", robot)["done_listeners"] for robot in found.robots[1:]}
+    assert found.leader.followers == ("follower_1", "follower_2", "follower_3")
+    listeners = {robot: found.of_robot(KINDS["fine_tuner"], robot).done_listeners for robot in found.robots[1:]}
     assert listeners == {"follower_1": 2, "follower_2": 2, "follower_3": 1}
 
 
@@ -178,54 +194,54 @@ def test_the_leader_waits_for_every_follower_and_each_tick_has_its_listeners(tra
 def test_a_file_says_only_what_differs_and_is_called_like_itself(write):
     found = load(write("seed: 7\npredictor:\n  name: previous\nworld:\n  camera: {mode: on_demand}\n"))
     assert found.setup == Setup(name="mine", seed=7)
-    assert found.sections["predictor"] == {"name": "previous"}
-    assert found.sections["world"] == {"camera.mode": "on_demand"}
-    assert found.parameters("predictor") == {**node_defaults("predictor"), "name": "previous"}
-    assert found.parameters("world")["seed"] == 7
+    assert found.settings["predictor"] == {"name": "previous"}
+    assert found.settings["world"] == {"camera.mode": "on_demand"}
+    assert found.predictor == PredictorParameters(name="previous")
+    assert found.world.seed == 7
 
 
 def test_an_override_beats_the_file_which_beats_config_which_beats_the_code(write):
     path = write("predictor:\n  forgetting: 0.9\n  sigma_u_m: 0.001\n")
-    found = override(load(path), ["predictor.forgetting=0.8"]).parameters("predictor")
-    assert (found["forgetting"], found["sigma_u_m"], found["max_u_m"]) == (0.8, 0.001, 0.1)
-    assert load(path).parameters("block_detector")["block_filtering"] == 40
+    found = override(load(path), ["predictor.forgetting=0.8"]).predictor
+    assert (found.forgetting, found.sigma_u_m, found.max_u_m) == (0.8, 0.001, 0.1)
+    assert load(path).block_detector.block_filtering == 40
     assert KINDS["block_detector"].parameter_class()().block_filtering == 3
 
 
 def test_the_last_of_several_overrides_counts_and_the_scenario_itself_is_not_changed(track_two):
     found = override(track_two, ["predictor.forgetting=0.8", "seed=3", "predictor.forgetting=0.7", "seed=4"])
-    assert found.parameters("predictor")["forgetting"] == 0.7
+    assert found.predictor.forgetting == 0.7
     assert found.setup.seed == 4
     assert track_two.setup.seed == 0
-    assert "predictor" not in track_two.sections or "forgetting" not in track_two.sections["predictor"]
+    assert "forgetting" not in track_two.settings.get("predictor", {})
 
 
 def test_values_of_overrides_are_yaml(track_two):
     settings = ["block_detector.signature_range=[1, 2.5]", "world.sleep=false", "name=my run", "drive.max_v_m=0.1"]
     found = override(track_two, settings)
-    assert found.parameters("block_detector")["signature_range"] == [1.0, 2.5]
-    assert found.parameters("world")["sleep"] is False
+    assert found.block_detector.signature_range == (1.0, 2.5)
+    assert found.world.sleep is False
     assert found.setup.name == "my run"
-    assert found.parameters("drive")["max_v_m"] == 0.1
+    assert found.drive.max_v_m == 0.1
 
 
 def test_a_value_may_hold_an_equals_sign(track_two):
     found = override(track_two, ["world.surface=plane", "world.surface_parameters=['height_m=0.2']"])
     found.check()
-    assert found.parameters("world")["surface_parameters"] == ["height_m=0.2"]
+    assert found.world.surface_parameters == ("height_m=0.2",)
 
 
 @pytest.mark.parametrize("surface", sorted(SURFACES))
 def test_another_surface_comes_with_its_own_defaults(track_two, surface):
     found = with_surface(override(track_two, ["world.surface_parameters=['height_m=0.2']"]), surface)
-    assert found.parameters("world")["surface"] == surface
-    assert found.parameters("world")["surface_parameters"] == []
+    assert found.world.surface == surface
+    assert found.world.surface_parameters == ()
     found.check()
 
 
 def test_every_predictor_can_be_chosen(track_two):
     for name in NAMES:
-        assert override(track_two, [f"predictor.name={name}"]).parameters("predictor")["name"] == name
+        assert override(track_two, [f"predictor.name={name}"]).predictor.name == name
     assert set(specs(PredictorParameters)["name"].choices) == set(NAMES)
 
 
@@ -342,8 +358,7 @@ def test_the_value_of_an_option_may_be_a_text():
     scenario = with_option(scenario, "world.real_time_factor", "2", "real_time_factor:=")
     scenario = with_option(scenario, "world.camera.mode", "on_demand", "camera:=")
     assert scenario.setup.seed == 7
-    world = scenario.parameters("world")
-    assert (world["real_time_factor"], world["camera.mode"]) == (2.0, "on_demand")
+    assert (scenario.world.real_time_factor, scenario.world.camera.mode) == (2.0, CameraMode.ON_DEMAND)
 
 
 @pytest.mark.parametrize("setting", ["sed=3", "predicter.name=x", "predictor.nam=x", "seed", "seed=[1", "seed=x"])

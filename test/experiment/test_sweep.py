@@ -82,11 +82,11 @@ def test_tasks_are_every_combination_once_and_all_of_a_seed_together():
 def test_a_runs_conditions_are_the_papers_fine_tuner_and_pictures_on_demand():
     scenario = sweep.build(Task("two", "ripple", "ewma+close", 7), ("predictor.ewma.gain=0.3",))
     assert scenario.setup.seed == 7
-    assert scenario.parameters("world")["surface"] == "ripple"
-    assert scenario.parameters("world")["camera.mode"] == "on_demand"
-    assert scenario.parameters("fine_tuner")["mode"] == "paper"
-    assert scenario.parameters("predictor")["name"] == "ewma+close"
-    assert scenario.parameters("predictor")["ewma.gain"] == 0.3
+    assert scenario.world.surface == "ripple"
+    assert scenario.world.camera.mode == "on_demand"
+    assert scenario.fine_tuner.mode == "paper"
+    assert scenario.predictor.name == "ewma+close"
+    assert scenario.predictor.ewma.gain == 0.3
 
 
 @pytest.mark.parametrize(

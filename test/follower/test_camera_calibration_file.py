@@ -20,7 +20,6 @@ from robot_formation.follower.camera_calibration_file import (
 )
 from robot_formation.follower.fine_tuning import FineTunerParameters
 from robot_formation.launching.processes import run_metadata
-from robot_formation.parameters import from_mapping
 from robot_formation.vision.pixy2.block import Block
 
 VALUES = {
@@ -35,7 +34,7 @@ VALUES = {
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "vision.yaml"
-    facts = {"seed": 3, "surface": "plane", **camera_facts(load_track("two"))}
+    facts = {"seed": 3, "surface": "plane", **camera_facts(load_track("two").world)}
     save_vision(path, VisionCalibration(VALUES, facts))
     return path
 
@@ -46,8 +45,8 @@ def scenario(path, *settings):
 
 def tuned_component(path):
     kind = KINDS["fine_tuner"]
-    values = {**scenario(path).robot_parameters("fine_tuner", "follower_1"), "mode": "paper"}
-    return kind.component_class()(from_mapping(kind.parameter_class(), values, where="test"), Place("follower_1"))
+    parameters = scenario(path, "fine_tuner.mode=paper").of_robot(kind, "follower_1")
+    return kind.component_class()(parameters, Place("follower_1"))
 
 
 def test_a_file_is_read_as_it_was_written(file):
@@ -85,7 +84,7 @@ def test_a_file_may_hold_some_values_only(tmp_path):
     path.write_text("alignment: {target_x_px: 135}\n")
     got = calibrated(FineTunerParameters(calibration_file=str(path))).alignment
     assert got == AlignmentParameters(target_x_px=135.0)
-    check_camera(scenario(path))  # it says nothing of its camera
+    check_camera(scenario(path).fine_tuner, scenario(path).world)  # it says nothing of its camera
 
 
 def test_calibrated_offset_is_zero_where_the_curves_say_formation():
@@ -145,7 +144,8 @@ def test_a_run_with_another_camera_refuses_the_file_and_one_with_other_light_doe
 
 
 def test_a_run_says_which_calibration_it_uses_and_keeps_the_values_in_its_bag(file):
-    assert describe_camera(scenario(file)) == f"camera calibration: {file}, measured with seed 3, surface plane"
+    said = describe_camera(scenario(file).fine_tuner)
+    assert said == f"camera calibration: {file}, measured with seed 3, surface plane"
     assert json.loads(run_metadata(scenario(file))["camera_calibration"]) == VALUES
-    assert describe_camera(load_track("two")) == ""
-    assert camera_values(load_track("two")) == {}
+    assert describe_camera(load_track("two").fine_tuner) == ""
+    assert camera_values(load_track("two").fine_tuner) == {}

@@ -4,7 +4,9 @@ import math
 
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
-from robot_formation.world import RobotStart, World, WorldParameters
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.start import RobotStart
+from robot_formation.world.world import World
 
 IDEAL = {
     "imperfections": {

@@ -39,7 +39,7 @@ def test_what_is_not_closed_is_said(text):
 def test_a_list_with_spaces_arrives_in_the_scenario():
     settings = "world.surface_parameters=[slope_deg=2, direction_deg=0] followers=2"
     found = scenario(track="one", surface="inclined_plane", set=settings)
-    assert found.parameters("world")["surface_parameters"] == ["slope_deg=2", "direction_deg=0"]
+    assert found.world.surface_parameters == ("slope_deg=2", "direction_deg=0")
     assert found.setup.followers == 2
 
 

@@ -13,7 +13,7 @@ from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import load_track
 from robot_formation.launching.arguments import ARGUMENTS
-from robot_formation.parameters import from_mapping, specs
+from robot_formation.parameters import specs
 
 NODE_PAGES = ROOT / "docs" / "nodes"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md", *(ROOT / "docs").rglob("*.md")]
@@ -49,8 +49,7 @@ TABLES = make_tables()
 
 def component(kind, robot):
     entry = KINDS[kind]
-    values = load_track("two").robot_parameters(kind, robot)
-    return entry.component_class()(from_mapping(entry.parameter_class(), values, where="test"), Place(robot))
+    return entry.component_class()(load_track("two").of_robot(entry, robot), Place(robot))
 
 
 def as_documented(topic, kind, robot):
@@ -92,7 +91,8 @@ def test_a_nodes_page_names_its_services_and_diagnostics(kind):
 
 
 @pytest.mark.parametrize(
-    ("node", "modules"), [("recorder", ("recording", "recorder_health")), ("player", ("playing",))]
+    ("node", "modules"),
+    [("recorder", ("recorder/recorder_node", "recorder/recorder_health")), ("player", ("player/player_node",))],
 )
 def test_the_pages_of_recorder_and_player_name_what_these_make_beside_a_bags_topics(node, modules):
     code = "".join((ROOT / "robot_formation" / "nodes" / f"{module}.py").read_text() for module in modules)

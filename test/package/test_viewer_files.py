@@ -8,10 +8,8 @@ import yaml
 
 from robot_formation import names
 from robot_formation.components.base import Place
-from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import load_track
 from robot_formation.names import absolute
-from robot_formation.parameters import from_mapping
 from robot_formation.paths import config_dir
 
 RVIZ = yaml.safe_load((config_dir() / "formation.rviz").read_text())
@@ -31,8 +29,7 @@ def topics():
     scenario = load_track("two")
     found = {absolute("", topic.name): topic for topic in (names.TF, names.TF_STATIC)}
     for kind, robot in scenario.hosts():
-        values = scenario.robot_parameters(kind.name, robot)
-        parameters = from_mapping(KINDS[kind.name].parameter_class(), values, where="test")
+        parameters = scenario.of_robot(kind, robot)
         namespace = f"/{robot}" if robot else ""
         for topic in kind.component_class()(parameters, Place(robot)).outputs():
             found[absolute(namespace, topic.name)] = topic

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robot_formation.marker import MarkerKind
 from robot_formation.surface import make_surface
 from robot_formation.vision import aruco_patterns
 from robot_formation.vision.aruco_detector import TagDetector, TagParameters
@@ -15,14 +16,16 @@ from robot_formation.vision.aruco_patterns import MODULES, QUIET_MODULES, Face, 
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import PictureError
-from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
-from robot_formation.world.parameters import MarkerParameters
+from robot_formation.world.camera import Camera
+from robot_formation.world.parameters import MarkerParameters, WorldParameters
+from robot_formation.world.pose import pose_on_surface
+from robot_formation.world.sensor import Sensor
 from tag_helpers import missing
 
 if missing():
     pytest.skip(missing(), allow_module_level=True)
 
-WORLD = WorldParameters(marker=MarkerParameters(kind="tags"))
+WORLD = WorldParameters(marker=MarkerParameters(kind=MarkerKind.TAGS))
 PLANE, BOWL = make_surface("plane"), make_surface("bowl")
 GREY = np.full((208, 316, 3), 110, np.uint8)
 DETECTOR = TagDetector()

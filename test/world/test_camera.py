@@ -5,8 +5,13 @@ import pybullet
 import pytest
 
 from robot_formation.surface import make_surface
-from robot_formation.world import Camera, Frame, Sensor, WorldParameters, marker_picture, pose_on_surface
+from robot_formation.world.camera import Camera
+from robot_formation.world.events import Frame
+from robot_formation.world.marker_picture import marker_picture
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
 from robot_formation.world.scene import FULL
+from robot_formation.world.sensor import Sensor
 from world_helpers import of_kind, parameters, run, world
 
 PLANE = make_surface("plane")

@@ -8,8 +8,11 @@ import pybullet
 import pytest
 
 from robot_formation.surface import make_surface
-from robot_formation.world import JOINT_NAMES, Camera, WorldParameters, pose_on_surface
+from robot_formation.world.camera import Camera
 from robot_formation.world.description import robot_description
+from robot_formation.world.events import JOINT_NAMES
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
 from world_helpers import parameters
 
 

@@ -10,9 +10,12 @@ from hypothesis import strategies as st
 
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import make_surface
-from robot_formation.world import Camera, Frame, Sensor, pose_on_surface
+from robot_formation.world.camera import Camera
+from robot_formation.world.events import Frame
 from robot_formation.world.exposure import LUMA, MAX_GAIN, READOUT_S, exposure_of
+from robot_formation.world.pose import pose_on_surface
 from robot_formation.world.scene import FULL
+from robot_formation.world.sensor import Sensor
 from world_helpers import of_kind, parameters, run, world
 
 PLANE = make_surface("plane")

@@ -5,7 +5,11 @@ import math
 import pytest
 
 from robot_formation.surface import PLATE_SIZE_M, SURFACES, make_surface
-from robot_formation.world import JointStates, LeftPlate, RobotPose, RobotStart, World, WorldError, WorldParameters
+from robot_formation.world.checks import WorldError
+from robot_formation.world.events import JointStates, LeftPlate, RobotPose
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.start import RobotStart
+from robot_formation.world.world import World
 from world_helpers import SPEEDS, of_kind, run, world
 
 NEAR_EDGE = (RobotStart("leader", 0.89, 1.7, 0.5 * math.pi), RobotStart("follower_1", 1.3, 0.9, 0.5 * math.pi))

@@ -2,7 +2,8 @@ import math
 
 import pytest
 
-from robot_formation.world import JOINT_NAMES, JointStates, RobotPose, RobotStart
+from robot_formation.world.events import JOINT_NAMES, JointStates, RobotPose
+from robot_formation.world.start import RobotStart
 from world_helpers import IDEAL, PAIR, SPEEDS, STRAIGHT, displacement, of_kind, run, world
 
 ALONE = (RobotStart("leader", 0.89, 0.89, 0.3, camera=False),)

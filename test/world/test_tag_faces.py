@@ -10,8 +10,11 @@ from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.surface import make_surface
 from robot_formation.vision import aruco_patterns
 from robot_formation.vision.aruco_patterns import MODULES, Face, pattern
-from robot_formation.world import Camera, WorldParameters, marker_picture, pose_on_surface
+from robot_formation.world.camera import Camera
 from robot_formation.world.description import robot_description
+from robot_formation.world.marker_picture import marker_picture
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
 from robot_formation.world.scene import Scene
 from robot_formation.world.tag_faces import FACES, tag_rectangles
 from tag_helpers import needs_tags

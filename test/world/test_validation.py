@@ -8,7 +8,9 @@ import pytest
 from robot_formation.drive.movement_system import Drive, DriveParameters
 from robot_formation.geometry.se2 import Motion
 from robot_formation.surface import SURFACES, make_surface
-from robot_formation.world import JointStates, RobotStart, World
+from robot_formation.world.events import JointStates
+from robot_formation.world.start import RobotStart
+from robot_formation.world.world import World
 from world_helpers import IDEAL, SPEEDS, displacement, of_kind, parameters, run, world
 
 pytestmark = pytest.mark.slow

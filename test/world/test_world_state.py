@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from robot_formation.surface import make_surface
-from robot_formation.world import Frame, RobotStart, World, WorldError
+from robot_formation.world.checks import WorldError
+from robot_formation.world.events import Frame
+from robot_formation.world.start import RobotStart
+from robot_formation.world.world import World
 from world_helpers import PAIR, SPEEDS, STRAIGHT, parameters, run, world
 
 TOUCHING = (

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from robot_formation.parameters import ParameterError
-from robot_formation.world import Frame, JointStates, RobotPose, RobotStart, WorldError
+from robot_formation.world.checks import WorldError
+from robot_formation.world.events import Frame, JointStates, RobotPose
+from robot_formation.world.start import RobotStart
 from world_helpers import PAIR, SPEEDS, STRAIGHT, of_kind, parameters, run, world
 
 HOLD = (0.0,) * 4

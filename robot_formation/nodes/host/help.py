@@ -73,7 +73,7 @@ def _facts(component: Component) -> Iterable[str]:
 
 
 def _parameter(spec: Spec) -> Iterable[str]:
-    default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
+    default = spec.plain_default()
     shown = repr(default) if isinstance(default, str) else str(default)
     unit = f" {spec.unit}" if spec.unit else ""
     limits = ""

@@ -147,8 +147,7 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
         objects.append(from_mapping(cls, {n: v for n, v in values.items() if n in specs(cls)}, where=where))
     node.fixed = reasons(known, fixed)
     for name, spec in known.items():
-        default = list(spec.default) if isinstance(spec.default, tuple) else spec.default
-        override = values.get(name, default)
+        override = values.get(name, spec.plain_default())
         node.declare_parameter(
             name,
             Parameter(name, _TYPES[spec.type], override).value,

@@ -15,8 +15,9 @@ from robot_formation.surface import make_surface
 from robot_formation.vision.overhead.camera_calibration import Calibration, ImperfectCalibration, Locator
 from robot_formation.vision.overhead.dot_tracking import OverheadTracker, OverheadTrackingParameters, assign
 from robot_formation.vision.overhead.dots import find_dots
-from robot_formation.world import WorldParameters, pose_on_surface
 from robot_formation.world.overhead import OverheadCamera
+from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pose import pose_on_surface
 
 BOWL, PLANE = make_surface("bowl"), make_surface("plane")
 RADIUS_PX = 3.8
