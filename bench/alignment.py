@@ -14,7 +14,7 @@ from pathlib import Path
 
 from joblib import Parallel, delayed
 
-from bench.alignment_grid import (
+from alignment_grid import (
     equipment,
     faces_seen,
     read_rows,

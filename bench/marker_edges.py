@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from joblib import Parallel, delayed
 
-from bench.alignment_grid import equipment
+from alignment_grid import equipment
 from robot_formation import names
 from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.alignment.precise.marker_edges import (

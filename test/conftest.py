@@ -3,13 +3,21 @@
 `pytest --hypothesis-profile=default` looks for new cases instead.
 """
 
+from __future__ import annotations
+
 import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
 from robot_formation.network.loopback import PROFILES
 from robot_formation.paths import config_dir
+
+if TYPE_CHECKING:  # it imports rclpy
+    from graph_lab import Lab
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -20,7 +28,7 @@ for variable in PROFILES:
 
 
 @pytest.fixture
-def lab(tmp_path):
+def lab(tmp_path: Path) -> Iterator[Lab]:
     """A ROS domain of the test's own."""
     from graph_lab import open_lab
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
-from rosbags.interfaces import MessageDefinitionFormat
+from rosbags.interfaces import ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
 
 from robot_formation.bag.errors import BagError
@@ -50,6 +50,7 @@ class SqliteSource(Source):
                     connection.msgcount,
                 )
                 for connection in connections
+                if isinstance(connection.ext, ConnectionExtRosbag2)  # always: it is no ROS 1 bag
             ]
             self.definitions = {
                 connection.msgtype: (_ENCODINGS[connection.msgdef.format], connection.msgdef.data)

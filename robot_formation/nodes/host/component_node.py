@@ -13,13 +13,15 @@ from functools import partial
 from typing import Any, Protocol
 
 import rclpy
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 from std_srvs.srv import SetBool, Trigger
 
 from robot_formation import conversions, exit_codes, names
@@ -102,7 +104,7 @@ def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
     finally:
         if node is not None:
             node.destroy_node()
-        rclpy.try_shutdown()
+        try_shutdown()
         ignore_signals()
 
 

@@ -11,7 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo

@@ -119,7 +119,8 @@ def _decoded(content: bytes) -> tuple[Picture | None, list[str]]:
                 image = None
         printed.seek(0)
         lines = printed.read(_MOST_COMPLAINTS).decode(errors="replace").splitlines()
-    return image, [line for line in lines if line.strip()]
+    picture = None if image is None else image.astype(np.uint8, copy=False)
+    return picture, [line for line in lines if line.strip()]
 
 
 @contextlib.contextmanager
