@@ -24,7 +24,7 @@ from robot_formation.nodes.progress.progress_node import Executable, ProgressPar
 from robot_formation.nodes.recorder.recorder_node import RecorderNode, RecorderParameters
 from robot_formation.parameters import Spec, specs
 
-PAGES = Path(__file__).parent / "nodes"
+PAGES = Path(__file__).parent / "reference" / "nodes"
 COMMON = "common"
 HEAD = "| name | type | unit | default | range | description |\n|---|---|---|---|---|---|"
 _TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- /parameters -->)", re.DOTALL)

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from repository import ROOT
+from repository import PACKAGE, ROOT
 from robot_formation import names
 from robot_formation.cli.main import VERBS
 from robot_formation.components.base import Place
@@ -15,7 +15,7 @@ from robot_formation.experiment.scenario import load_track
 from robot_formation.launching.arguments import ARGUMENTS
 from robot_formation.parameters import from_mapping, specs
 
-NODE_PAGES = ROOT / "docs" / "nodes"
+NODE_PAGES = ROOT / "docs" / "reference" / "nodes"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md", *(ROOT / "docs").rglob("*.md")]
 NODES = [*KINDS, "recorder", "player", "progress"]
 QOS = {
@@ -92,10 +92,10 @@ def test_a_nodes_page_names_its_services_and_diagnostics(kind):
 
 
 @pytest.mark.parametrize(
-    ("node", "modules"), [("recorder", ("recording", "recorder_health")), ("player", ("playing",))]
+    ("node", "modules"), [("recorder", ("recorder_node", "recorder_health")), ("player", ("player_node",))]
 )
 def test_the_pages_of_recorder_and_player_name_what_these_make_beside_a_bags_topics(node, modules):
-    code = "".join((ROOT / "robot_formation" / "nodes" / f"{module}.py").read_text() for module in modules)
+    code = "".join((PACKAGE / "nodes" / node / f"{module}.py").read_text() for module in modules)
     page = (NODE_PAGES / f"{node}.md").read_text()
     for kind, name in re.findall(r'create_service\((\w+), "([^"]+)"', code):
         assert f"| `{name}` | std_srvs/srv/{kind} |" in page
@@ -171,7 +171,7 @@ def test_the_readmes_graph_is_the_real_one():
 def test_the_readme_links_to_every_node_and_names_every_verb():
     readme = (ROOT / "README.md").read_text()
     for node in NODES:
-        assert f"](docs/nodes/{node}.md)" in readme
+        assert f"](docs/reference/nodes/{node}.md)" in readme
     for verb in VERBS:
         name = verb.__name__.rpartition(".")[2].rstrip("_")
         assert re.search(rf"^\| `{name}\b", readme, re.MULTILINE)
@@ -180,13 +180,13 @@ def test_the_readme_links_to_every_node_and_names_every_verb():
 def test_the_pages_scenario_can_be_loaded(tmp_path):
     from robot_formation.experiment.scenario import load
 
-    text = re.search(r"```yaml\n(.*?)```", (ROOT / "docs" / "scenarios.md").read_text(), re.DOTALL)[1]
+    text = re.search(r"```yaml\n(.*?)```", (ROOT / "docs" / "how-to" / "scenarios.md").read_text(), re.DOTALL)[1]
     (tmp_path / "scenario.yaml").write_text(text)
     load(tmp_path / "scenario.yaml").check()
 
 
 def test_the_installations_launch_arguments_are_those_of_the_launch_file():
-    command = re.search(r"ros2 launch .*\\\n.*", (ROOT / "docs" / "installation.md").read_text())[0]
+    command = re.search(r"ros2 launch .*\\\n.*", (ROOT / "docs" / "how-to" / "installation.md").read_text())[0]
     used = re.findall(r"(\w+):=", command)
     assert used
     assert set(used) <= set(ARGUMENTS)
