@@ -1,4 +1,4 @@
-"""A follower without the world: a bridge to wheels and a Pixy2 that keep what docs/how-to/real_robots.md asks of them."""
+"""A follower without the world: stand-ins for wheels and Pixy2 that keep the promises of docs/how-to/real_robots.md."""
 
 import math
 import re
