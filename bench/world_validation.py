@@ -1,6 +1,6 @@
 """How far the world is from closed-form truth: kinematics on the plane, statics on slopes, creep on every surface.
 
-Prints the figures of docs/world.md. Robots have no imperfections.
+Prints the figures of docs/explanation/world.md. Robots have no imperfections.
 
 Run: python bench/world_validation.py
 """

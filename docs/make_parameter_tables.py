@@ -27,7 +27,7 @@ from robot_formation.nodes.recorder.recorder_node import RecorderNode, RecorderP
 from robot_formation.parameters import Spec, specs
 
 SCHEMA = Path(__file__).parents[1] / "config" / "scenario.schema.json"
-PAGES = Path(__file__).parent / "nodes"
+PAGES = Path(__file__).parent / "reference" / "nodes"
 COMMON = "common"
 HEAD = "| name | type | unit | default | range | description |\n|---|---|---|---|---|---|"
 _TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- /parameters -->)", re.DOTALL)

@@ -2,7 +2,7 @@
 
 Paper, "Visual fine-tuning process calibrations": reach the area where only the Target face is seen, then fine-tune the
 position along v by the block's column, then u by its side length. The paper's flow chart is missing; our reading of it
-is documented in docs/paper.md ("Reading of the paper").
+is documented in docs/explanation/paper.md ("Reading of the paper").
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""docs/alignment.md against the code: the state machine's diagram and the verdicts."""
+"""docs/explanation/alignment.md against the code: the state machine's diagram and the verdicts."""
 
 import re
 from functools import cache
@@ -12,7 +12,7 @@ from robot_formation.follower.fine_tuning import FineTuner, FineTunerParameters,
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 
-PAGE = (ROOT / "docs" / "alignment.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "explanation" / "alignment.md").read_text(encoding="utf-8")
 IN_PLACE = state_of()
 
 

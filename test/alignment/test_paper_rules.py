@@ -202,7 +202,7 @@ def test_empty_looks_count_only_in_a_row():
     assert alignment.assess([]).verdict is Verdict.LOST
 
 
-def test_two_blocks_of_one_signature_are_one_hull():
+def test_two_blocks_of_one_signature_are_one_box():
     left, right = Block(TARGET, 145, 60, 20, 48), Block(TARGET, 171, 62, 24, 44)
     (box,) = bounding_boxes([left, right]).values()
     assert (box.left, box.right, box.top, box.bottom) == (135, 183, 36, 84)
@@ -221,7 +221,7 @@ blocks = st.builds(
 
 
 @given(found=st.lists(blocks, max_size=6))
-def test_a_hull_holds_its_blocks_and_no_edge_lies_elsewhere(found):
+def test_a_bounding_box_holds_its_blocks_and_no_edge_lies_elsewhere(found):
     boxes = bounding_boxes(found)
     assert set(boxes) == {b.signature for b in found} - {4}
     for signature, box in boxes.items():

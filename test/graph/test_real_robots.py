@@ -1,4 +1,4 @@
-"""A follower without the world: a bridge to wheels and a Pixy2 that keep what docs/real_robots.md asks of them."""
+"""A follower without the world: stand-ins for wheels and Pixy2 that keep the promises of docs/how-to/real_robots.md."""
 
 import math
 import re
@@ -15,7 +15,7 @@ from robot_formation.nodes.host.component_node import qos_profile
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("real_robots")]
 
-PAGE = ROOT / "docs" / "real_robots.md"
+PAGE = ROOT / "docs" / "how-to" / "real_robots.md"
 ROBOT = "/follower_1"
 # The camera's library, with the Target face where it belongs in formation.
 PIXY = """
@@ -73,7 +73,7 @@ def start_camera(lab, folder):
     (folder / "driver.py").write_text(code)
     (folder / "pixy.py").write_text(PIXY)
     command = [sys.executable, str(folder / "driver.py"), "--ros-args", "-r", f"__ns:={ROBOT}"]
-    path = f"{folder}:{PAGE.parent.parent}"
+    path = f"{folder}:{ROOT}"
     return lab.open(command, {**lab.environment, "PYTHONPATH": path, "PYTHONSAFEPATH": ""})
 
 

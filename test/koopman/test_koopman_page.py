@@ -6,13 +6,13 @@ import re
 import robot_formation.koopman as koopman
 from repository import ROOT
 
-PAGE = (ROOT / "docs" / "koopman.md").read_text()
+PAGE = (ROOT / "docs" / "explanation" / "koopman.md").read_text()
 
 
 def test_the_example_runs_and_prints_what_it_says(capsys):
     code = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1]
     names = {}
-    exec(compile(code, "docs/koopman.md", "exec"), names)
+    exec(compile(code, "docs/explanation/koopman.md", "exec"), names)
     printed = capsys.readouterr().out
     stated = re.search(r"# (\[[^]]*\]): mu, 2 mu, lam", code)[1]
     assert printed.startswith(stated)

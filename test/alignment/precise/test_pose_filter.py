@@ -40,7 +40,7 @@ def look(pose_filter, state):
 
 @settings(max_examples=12, deadline=None)
 @given(st.floats(-0.02, 0.02), st.floats(0.29, 0.4), st.floats(-0.1, 0.1))
-def test_place_and_lean_follow_from_one_look_in_formation(x_m, y_m, yaw_rad):
+def test_place_and_relative_tilt_follow_from_one_look_in_formation(x_m, y_m, yaw_rad):
     state, found = state_of(x_m, y_m, yaw_rad), new_filter()
     look(found, state)
     # Without the relative tilt, the side length alone would put it 1.9 cm off.

@@ -35,7 +35,7 @@ def test_a_code_is_read_in_the_direction_of_the_smaller_number(image, code, angl
     assert (box.signature, box.angle) == (code, angle)
 
 
-def test_the_box_of_a_code_is_the_hull_of_its_parts():
+def test_the_box_of_a_code_is_the_bounding_box_of_its_parts():
     (box,) = detector(mode=1).detect(TOP_DOWN)
     assert (box.left, box.top, box.bottom) == (100, 20, 139)
 
