@@ -67,7 +67,7 @@ def test_package_xml_names_every_ros_package_that_is_imported(package_xml):
     keys = {element.text for element in package_xml if element.tag in ("depend", "exec_depend")}
     imported = set()
     for file in [
-        *NODES.glob("*.py"),
+        *(ROOT / "robot_formation" / "nodes").rglob("*.py"),
         *(ROOT / "robot_formation" / "conversions").glob("*.py"),
         *(ROOT / "launch").glob("*.py"),
     ]:
