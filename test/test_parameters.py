@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import FrozenInstanceError, dataclass, fields, is_dataclass
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -35,11 +36,11 @@ class Car:
     wheel: Wheel = Wheel()
 
 
-def build(**values):
+def build(**values: Any) -> Car:
     return from_mapping(Car, values, where="car.yaml")
 
 
-def test_specs_list_nested_parameters_by_dotted_name_with_all_that_is_known():
+def test_specs_list_nested_parameters_by_dotted_name_with_all_that_is_known() -> None:
     found = specs(Car)
     assert list(found) == ["count", "fast", "curve", "gears", "riders", "wheel.radius_m", "wheel.name"]
     radius = found["wheel.radius_m"]
@@ -48,11 +49,11 @@ def test_specs_list_nested_parameters_by_dotted_name_with_all_that_is_known():
     assert found["wheel.name"].choices == ("mecanum", "omni")
 
 
-def test_nothing_given_means_the_defaults():
+def test_nothing_given_means_the_defaults() -> None:
     assert build() == Car()
 
 
-def test_nested_and_dotted_names_mean_the_same():
+def test_nested_and_dotted_names_mean_the_same() -> None:
     nested = build(wheel={"radius_m": 0.05}, count=3)
     assert nested == from_mapping(Car, {"wheel.radius_m": 0.05, "count": 3}, where="car.yaml")
     assert nested == Car(count=3, wheel=Wheel(radius_m=0.05))
@@ -70,14 +71,14 @@ cars = st.builds(
 
 
 @given(car=cars)
-def test_a_mapping_and_back_gives_the_same_object(car):
+def test_a_mapping_and_back_gives_the_same_object(car: Car) -> None:
     flat = to_mapping(car)
     assert set(flat) == set(specs(Car))
     assert not any(isinstance(value, tuple) for value in flat.values())
     assert from_mapping(Car, flat, where="test") == car
 
 
-def test_flatten_joins_names_with_dots():
+def test_flatten_joins_names_with_dots() -> None:
     assert flatten({"a": {"b": {"c": 1}, "d": [2]}, "e": None}) == {"a.b.c": 1, "a.d": [2], "e": None}
 
 
@@ -116,7 +117,7 @@ def test_flatten_joins_names_with_dots():
         ({"riders": ["Ann", 3]}, "'riders' must be of type str, not 3"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(values, text):
+def test_what_is_wrong_is_said_in_one_line(values: dict[str, Any], text: str) -> None:
     with pytest.raises(ParameterError) as caught:
         build(**values)
     assert text in str(caught.value)
@@ -124,33 +125,33 @@ def test_what_is_wrong_is_said_in_one_line(values, text):
     assert "\n" not in str(caught.value)
 
 
-def test_whole_numbers_are_taken_for_floats_and_become_floats():
+def test_whole_numbers_are_taken_for_floats_and_become_floats() -> None:
     found = build(wheel={"radius_m": 0.1}, curve=[1, 2])
     assert found.curve == (1.0, 2.0)
     assert all(type(value) is float for value in found.curve)
 
 
-def test_the_ends_of_a_range_are_inside():
+def test_the_ends_of_a_range_are_inside() -> None:
     assert build(count=8, wheel={"radius_m": 0.01}) == Car(count=8, wheel=Wheel(radius_m=0.01))
 
 
-def test_an_empty_list_is_refused_where_the_default_has_values():
+def test_an_empty_list_is_refused_where_the_default_has_values() -> None:
     with pytest.raises(ParameterError, match="'gears' must not be empty"):
         build(gears=[])
 
 
-def test_parameter_objects_do_not_change():
+def test_parameter_objects_do_not_change() -> None:
     with pytest.raises(FrozenInstanceError):
-        build().count = 5
+        build().count = 5  # type: ignore[misc]
 
 
-def test_checks_of_the_class_itself_are_reached():
+def test_checks_of_the_class_itself_are_reached() -> None:
     world = KINDS["world"].parameter_class()
     with pytest.raises(ParameterError, match="must divide physics_hz = 240"):
         from_mapping(world, {"camera": {"min_frames_per_second": 50}}, where="test")
 
 
-def test_without_any_name_there_is_no_suggestion():
+def test_without_any_name_there_is_no_suggestion() -> None:
     assert suggestion("x", []) == ""
 
 
@@ -158,7 +159,7 @@ def test_without_any_name_there_is_no_suggestion():
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_every_parameter_of_a_node_has_a_description_and_a_default_that_passes_its_own_check(kind):
+def test_every_parameter_of_a_node_has_a_description_and_a_default_that_passes_its_own_check(kind: str) -> None:
     cls = KINDS[kind].parameter_class()
     for spec in specs(cls).values():
         assert spec.description, spec.name
@@ -166,7 +167,7 @@ def test_every_parameter_of_a_node_has_a_description_and_a_default_that_passes_i
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_names_and_units_of_a_nodes_parameters_agree(kind):
+def test_names_and_units_of_a_nodes_parameters_agree(kind: str) -> None:
     endings = {"_m": "m", "_s": "s", "_rad": "rad", "_deg": "deg", "_px": "px", "_hz": "Hz", "_rad_s": "rad/s"}
     for name, spec in specs(KINDS[kind].parameter_class()).items():
         for ending, unit in endings.items():
@@ -177,7 +178,7 @@ def test_names_and_units_of_a_nodes_parameters_agree(kind):
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_numbers_of_a_node_have_a_range_so_that_absurd_ones_are_refused(kind):
+def test_numbers_of_a_node_have_a_range_so_that_absurd_ones_are_refused(kind: str) -> None:
     free = {"camera.centre_x_px", "camera.centre_y_px", "calibration.v", "calibration.u", "calibration.turn"}
     lists = {"start_x_m", "start_y_m", "start_heading_rad"}
     for name, spec in specs(KINDS[kind].parameter_class()).items():
@@ -187,14 +188,14 @@ def test_numbers_of_a_node_have_a_range_so_that_absurd_ones_are_refused(kind):
             assert spec.low <= spec.default <= spec.high
 
 
-def test_nested_parameters_are_dataclasses_all_the_way():
+def test_nested_parameters_are_dataclasses_all_the_way() -> None:
     for kind in KINDS.values():
         cls = kind.parameter_class()
         assert is_dataclass(cls)
         assert all(field.metadata or is_dataclass(field.default) for field in fields(cls))
 
 
-def test_a_nested_dataclass_keeps_the_defaults_that_its_owner_gives_it():
+def test_a_nested_dataclass_keeps_the_defaults_that_its_owner_gives_it() -> None:
     @dataclass(frozen=True)
     class Inner:
         a: float = parameter(1.0, "a")
@@ -219,7 +220,7 @@ def test_a_nested_dataclass_keeps_the_defaults_that_its_owner_gives_it():
         del globals()["Inner"], globals()["Middle"]
 
 
-def test_former_names_of_parameters_are_still_taken():
+def test_former_names_of_parameters_are_still_taken() -> None:
     from robot_formation.components.catalogue import KINDS
     from robot_formation.parameters import FORMER_NAMES, specs
 

@@ -1,12 +1,15 @@
 """Displacement logs: what is read, what is refused and how it is said; one-step forecasts and their errors."""
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.typing import ArrayLike, NDArray
 
 from robot_formation.analysis.displacement_log import DisplacementLog, read_log, write_log
 from robot_formation.analysis.errors import AnalysisError
@@ -17,17 +20,19 @@ FULL = "u_m,v_m,residual_u_m,residual_v_m,commanded_u_m,commanded_v_m"
 
 
 @pytest.fixture
-def file(tmp_path):
+def file(tmp_path: Path) -> Callable[[str | bytes], Path]:
     path = tmp_path / "log.csv"
 
-    def write(content):
+    def write(content: str | bytes) -> Path:
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
         return path
 
     return write
 
 
-def log_of(displacements, residuals=None, commanded=None):
+def log_of(
+    displacements: ArrayLike, residuals: ArrayLike | None = None, commanded: ArrayLike | None = None
+) -> DisplacementLog:
     displacements = np.array(displacements, dtype=float)
     unknown = np.full_like(displacements, np.nan)
     places = tuple(f"line {t + 2}" for t in range(len(displacements)))
@@ -40,7 +45,7 @@ def log_of(displacements, residuals=None, commanded=None):
     )
 
 
-def test_a_log_of_displacements_alone_has_them_for_targets(file):
+def test_a_log_of_displacements_alone_has_them_for_targets(file: Callable[[str | bytes], Path]) -> None:
     log = read_log(file("u_m,v_m\n0.01,0.05\n-0.02,5e-2\n"))
     np.testing.assert_array_equal(log.displacements_m, [[0.01, 0.05], [-0.02, 0.05]])
     np.testing.assert_array_equal(log.targets_m, log.displacements_m)
@@ -49,7 +54,7 @@ def test_a_log_of_displacements_alone_has_them_for_targets(file):
     assert not log.has_commanded
 
 
-def test_with_residuals_the_target_is_the_ideal_move(file):
+def test_with_residuals_the_target_is_the_ideal_move(file: Callable[[str | bytes], Path]) -> None:
     log = read_log(file(f"{FULL}\n0.01,0.05,0.001,-0.002,0.02,0.06\n0.02,0.05,,,,\n"))
     np.testing.assert_allclose(log.targets_m, [[0.011, 0.048], [np.nan, np.nan]], rtol=0, atol=1e-15)
     np.testing.assert_array_equal(log.commanded_m, [[0.02, 0.06], [np.nan, np.nan]])
@@ -68,7 +73,7 @@ def test_with_residuals_the_target_is_the_ideal_move(file):
         "u_m,v_m\n0.01,0.05",
     ],
 )
-def test_what_is_harmless_is_read(file, content):
+def test_what_is_harmless_is_read(file: Callable[[str | bytes], Path], content: str) -> None:
     log = read_log(file(content))
     np.testing.assert_array_equal(log.displacements_m, [[0.01, 0.05]])
 
@@ -104,7 +109,9 @@ def test_what_is_harmless_is_read(file, content):
         ("u_m,v_m\n0.01," + "x" * 1000 + "\n", ["line 2", "no number"]),
     ],
 )
-def test_what_is_wrong_is_named_with_its_line_in_one_sentence(file, content, words):
+def test_what_is_wrong_is_named_with_its_line_in_one_sentence(
+    file: Callable[[str | bytes], Path], content: bytes | str, words: list[str]
+) -> None:
     path = file(content)
     with pytest.raises(AnalysisError) as caught:
         read_log(path)
@@ -115,14 +122,14 @@ def test_what_is_wrong_is_named_with_its_line_in_one_sentence(file, content, wor
     assert len(text) < len(str(path)) + 200
 
 
-def test_a_file_that_is_not_there_or_a_folder_is_said(tmp_path):
+def test_a_file_that_is_not_there_or_a_folder_is_said(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "missing.csv"):
         with pytest.raises(AnalysisError, match="can't be read"):
             read_log(path)
 
 
 @given(st.binary(max_size=200))
-def test_whatever_is_in_a_file_it_is_read_or_refused(tmp_path_factory, content):
+def test_whatever_is_in_a_file_it_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
     path = tmp_path_factory.getbasetemp() / "any.csv"
     path.write_bytes(b"u_m,v_m\n" + content)
     try:
@@ -136,7 +143,9 @@ PAIRS = arrays(float, st.tuples(st.integers(1, 8), st.just(2)), elements=st.floa
 
 
 @given(PAIRS, st.booleans(), st.booleans())
-def test_what_was_written_is_read_back_to_the_last_bit(tmp_path_factory, values, residuals, commanded):
+def test_what_was_written_is_read_back_to_the_last_bit(
+    tmp_path_factory: pytest.TempPathFactory, values: NDArray[np.float64], residuals: bool, commanded: bool
+) -> None:
     gaps = values.copy()
     gaps[1::2] = np.nan
     log = log_of(values, gaps if residuals else None, gaps if commanded else None)
@@ -147,7 +156,7 @@ def test_what_was_written_is_read_back_to_the_last_bit(tmp_path_factory, values,
         np.testing.assert_array_equal(getattr(back, name), getattr(log, name))
 
 
-def test_a_log_is_never_written_over_another_file(tmp_path):
+def test_a_log_is_never_written_over_another_file(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("precious")
     with pytest.raises(AnalysisError, match="exists already"):
         write_log(log_of([[0.0, 0.05]]), tmp_path / "log.csv")
@@ -156,19 +165,19 @@ def test_a_log_is_never_written_over_another_file(tmp_path):
         write_log(log_of([[0.0, 0.05]]), tmp_path / "nowhere" / "log.csv")
 
 
-def wandering(count, seed=5):
+def wandering(count: int, seed: int = 5) -> NDArray[np.float64]:
     rng = np.random.default_rng(seed)
     return np.array([0.0, 0.05]) + rng.normal(0.0, 0.004, (count, 2))
 
 
-def test_previous_forecasts_the_row_before():
+def test_previous_forecasts_the_row_before() -> None:
     log = log_of(wandering(12))
     forecasts = forecast_log(log, PredictorParameters(name="previous"))
     assert np.isnan(forecasts.means_m[0]).all()
     np.testing.assert_array_equal(forecasts.means_m[1:], log.displacements_m[:-1])
 
 
-def test_literal_forecasts_powers_of_the_first_fit_whatever_follows():
+def test_literal_forecasts_powers_of_the_first_fit_whatever_follows() -> None:
     x = np.array([[0.010, 0.050], [0.008, 0.052], [0.011, 0.049], [0.3, 0.3], [-0.3, 0.3], [0.0, 0.0]])
     k = x[1:3].T @ np.linalg.inv(x[:2].T)
     expected = [np.linalg.matrix_power(k, n) @ x[2] for n in (1, 2, 3)]
@@ -176,7 +185,7 @@ def test_literal_forecasts_powers_of_the_first_fit_whatever_follows():
     np.testing.assert_allclose(forecasts.means_m[3:], expected, rtol=1e-9)
 
 
-def test_measured_forecasts_by_the_least_squares_fit_of_all_pairs_before():
+def test_measured_forecasts_by_the_least_squares_fit_of_all_pairs_before() -> None:
     x = wandering(15)
     forecasts = forecast_log(log_of(x), PredictorParameters(name="measured"))
     for t in range(3, 15):
@@ -185,7 +194,7 @@ def test_measured_forecasts_by_the_least_squares_fit_of_all_pairs_before():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_forecast_is_made_from_the_rows_before_it_only(name):
+def test_a_forecast_is_made_from_the_rows_before_it_only(name: str) -> None:
     x, r, c = wandering(10), wandering(10, 6) - [0.0, 0.05], wandering(10, 7)
     known = forecast_log(log_of(x, r, c), PredictorParameters(name=name))
     changed = [values.copy() for values in (x, r, c)]
@@ -196,7 +205,7 @@ def test_a_forecast_is_made_from_the_rows_before_it_only(name):
     np.testing.assert_array_equal(known.covariances_m2[:7], other.covariances_m2[:7])
 
 
-def test_a_row_that_a_predictor_refuses_is_named():
+def test_a_row_that_a_predictor_refuses_is_named() -> None:
     with pytest.raises(AnalysisError, match=r"log\.csv, line 4: refused the displacement .* raise predictor\.max_u_m"):
         forecast_log(log_of([[0.0, 0.05], [0.0, 0.05], [0.0, 1e300]]), PredictorParameters(name="previous"))
     with pytest.raises(AnalysisError, match=r"line 3: refused the residual"):
@@ -205,7 +214,7 @@ def test_a_row_that_a_predictor_refuses_is_named():
         )
 
 
-def test_errors_are_summed_up_as_defined():
+def test_errors_are_summed_up_as_defined() -> None:
     errors = np.array([[np.nan, np.nan], [0.003, 0.004], [0.0, 0.0], [-0.006, 0.008], [np.nan, 0.1]])
     covariances = np.broadcast_to(np.eye(2) * 0.003**2, (5, 2, 2))
     found = error_statistics(errors, covariances)
@@ -218,13 +227,13 @@ def test_errors_are_summed_up_as_defined():
     assert found["coverage_90"] == pytest.approx(2 / 3)  # 25 / 9 < 4.605 < 100 / 9
 
 
-def test_without_errors_there_are_no_statistics():
+def test_without_errors_there_are_no_statistics() -> None:
     found = error_statistics(np.full((1, 2), np.nan), np.full((1, 2, 2), np.nan))
     assert found.pop("n") == 0
     assert set(found.values()) == {None}
 
 
-def test_timesteps_without_a_residual_count_for_no_error_in_a_log_that_has_residuals():
+def test_timesteps_without_a_residual_count_for_no_error_in_a_log_that_has_residuals() -> None:
     x, r = wandering(8), np.zeros((8, 2))
     r[3] = np.nan
     forecasts = forecast_log(log_of(x, r), PredictorParameters(name="previous"))
@@ -238,7 +247,9 @@ def test_timesteps_without_a_residual_count_for_no_error_in_a_log_that_has_resid
     st.floats(1e-3, 0.05),
     st.floats(-0.95, 0.95),
 )
-def test_the_ellipse_is_that_of_the_inverse_covariance(error, sigma_u, sigma_v, correlation):
+def test_the_ellipse_is_that_of_the_inverse_covariance(
+    error: NDArray[np.float64], sigma_u: float, sigma_v: float, correlation: float
+) -> None:
     mixed = correlation * sigma_u * sigma_v
     covariance = np.array([[sigma_u**2, mixed], [mixed, sigma_v**2]])
     size = error @ np.linalg.solve(covariance, error)
@@ -246,11 +257,11 @@ def test_the_ellipse_is_that_of_the_inverse_covariance(error, sigma_u, sigma_v, 
         assert inside_ellipse(error[None], covariance[None])[0] == (size < CHI_SQUARE_90)
 
 
-def test_a_covariance_of_zero_holds_only_an_error_of_zero():
+def test_a_covariance_of_zero_holds_only_an_error_of_zero() -> None:
     assert inside_ellipse(np.array([[0.0, 0.0], [0.0, 1e-6]]), np.zeros((2, 2, 2))).tolist() == [True, False]
 
 
-def test_nine_in_ten_normal_errors_lie_inside():
+def test_nine_in_ten_normal_errors_lie_inside() -> None:
     rng = np.random.default_rng(1)
     covariance = np.array([[4e-6, 1e-6], [1e-6, 1e-6]])
     errors = rng.multivariate_normal(np.zeros(2), covariance, 20_000)

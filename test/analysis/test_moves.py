@@ -3,6 +3,7 @@
 import json
 import math
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.moves import UNKNOWN, Loss, losses, move_totals, moves_of, summed
-from robot_formation.analysis.quantities import analyse
+from robot_formation.analysis.quantities import FollowerAnalysis, analyse
 from robot_formation.analysis.report import text_report, to_json
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
 from robot_formation.bag.message_recorder import Recorder
@@ -26,24 +27,28 @@ SECOND = 10**9
 class Story:
     """A run told event by event, a second each: moves with what is said before them, words, ends of timesteps."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.now = 0
-        self.leader, self.moved, self.commands, self.said, self.displacements = [], [], [], [], []
+        self.leader: list[Stamped] = []
+        self.moved: list[Stamped] = []
+        self.commands: list[Motion] = []
+        self.said: list[tuple[str, int]] = []
+        self.displacements: list[Stamped] = []
 
-    def tick(self):
+    def tick(self) -> None:
         self.now += SECOND
 
-    def say(self, text):
+    def say(self, text: str) -> "Story":
         self.tick()
         self.said.append((text, self.now))
         return self
 
-    def step(self, opening="predict"):
+    def step(self, opening: str = "predict") -> "Story":
         self.tick()
         self.leader.append(Stamped(self.now, Motion(0.05)))
         return self.move(Motion(0.05), opening)
 
-    def move(self, command, text=None):
+    def move(self, command: Motion, text: str | None = None) -> "Story":
         if text:
             self.say(text)
         self.tick()
@@ -52,12 +57,12 @@ class Story:
         self.moved.append(Stamped(self.now, Motion(command.x_m + 1e-3, command.y_m - 2e-3, command.yaw_rad + 0.01)))
         return self
 
-    def done(self):
+    def done(self) -> "Story":
         self.tick()
         self.displacements.append(Stamped(self.now, Motion(0.05)))
         return self
 
-    def follower(self, *, commands=True, stamps=True):
+    def follower(self, *, commands: bool = True, stamps: bool = True) -> FollowerRecord:
         return FollowerRecord(
             "follower_1",
             tuple(self.moved),
@@ -67,11 +72,11 @@ class Story:
             commands=tuple(self.commands) if commands else (),
         )
 
-    def analysed(self, **options):
+    def analysed(self, **options: bool) -> FollowerAnalysis:
         return analyse(RunRecord(tuple(self.leader), (self.follower(**options),))).followers[0]
 
 
-def three_timesteps():
+def three_timesteps() -> Story:
     """Timestep 0 with a move, then one of two kinds, one without any, one with a search."""
     story = Story().say("align").move(U, "correct: fine-tune u").say("aligned")
     story.step("collect").move(V, "correct: fine-tune v").move(V, "correct: fine-tune v")
@@ -81,7 +86,7 @@ def three_timesteps():
     return story.move(TURN, "correct: turn").say("aligned").done()
 
 
-def test_moves_are_counted_by_commanded_axis_and_by_what_was_said_of_them():
+def test_moves_are_counted_by_commanded_axis_and_by_what_was_said_of_them() -> None:
     rows = [timestep.to_json() for timestep in three_timesteps().analysed().timesteps]
     assert [row["moves_by_axis"] for row in rows] == [
         {"u": 1, "v": 2, "turn": 0},
@@ -96,21 +101,21 @@ def test_moves_are_counted_by_commanded_axis_and_by_what_was_said_of_them():
     assert [row["correction_turn_rad"] for row in rows] == pytest.approx([0.03, 0.0, 0.22])
 
 
-def test_totals_add_up_the_timesteps_without_the_initial_alignment():
+def test_totals_add_up_the_timesteps_without_the_initial_alignment() -> None:
     totals = three_timesteps().analysed().totals
     assert totals["moves_by_axis"] == {"u": 1, "v": 2, "turn": 2}
     assert sum(totals["moves_by_kind"].values()) == totals["movements"] == 5
     assert (totals["movements_median"], totals["movements_max"]) == (2, 3)
 
 
-def test_a_loss_lasts_from_the_first_look_in_vain_to_the_look_that_shows_the_neighbour():
+def test_a_loss_lasts_from_the_first_look_in_vain_to_the_look_that_shows_the_neighbour() -> None:
     totals = three_timesteps().analysed().totals
     # hold, hold, search, its move, reacquired: four seconds from the first to the last.
     assert totals["losses"] == [{"t": 3, "looks": 3, "moves": 1, "seconds": 4.0, "reacquired": True}]
     assert (totals["reacquired"], totals["reacquisition_median_s"], totals["reacquisition_max_s"]) == (1, 4.0, 4.0)
 
 
-def test_several_losses_are_told_apart_and_their_times_summarised():
+def test_several_losses_are_told_apart_and_their_times_summarised() -> None:
     story = Story().say("align").say("hold").say("reacquired").say("aligned")
     story.step("collect").say("hold").say("hold").say("hold").say("reacquired").say("aligned").done()
     story.step("collect").say("hold").move(U, "search: x").say("lost")
@@ -124,17 +129,17 @@ def test_several_losses_are_told_apart_and_their_times_summarised():
     assert (totals["reacquired"], totals["reacquisition_median_s"], totals["reacquisition_max_s"]) == (2, 2.0, 3.0)
 
 
-def test_a_camera_that_falls_silent_is_a_loss_without_a_look_in_vain():
+def test_a_camera_that_falls_silent_is_a_loss_without_a_look_in_vain() -> None:
     story = Story().say("align").say("aligned").step().say("lost")
     assert losses(story.follower()) == (Loss(1, 0, 0, 0.0, False),)
 
 
-def test_a_record_that_ends_during_a_loss_has_it_as_not_reacquired():
+def test_a_record_that_ends_during_a_loss_has_it_as_not_reacquired() -> None:
     story = Story().say("align").step().say("hold").move(U, "search: x")
     assert losses(story.follower()) == (Loss(1, 2, 1, 1.0, False),)
 
 
-def test_without_stamps_or_commands_what_they_tell_is_unknown_and_the_rest_is_not():
+def test_without_stamps_or_commands_what_they_tell_is_unknown_and_the_rest_is_not() -> None:
     analysis = three_timesteps().analysed(commands=False, stamps=False)
     assert analysis.timesteps[0].moves.axes is None
     assert analysis.totals["moves_by_axis"] is None
@@ -143,7 +148,7 @@ def test_without_stamps_or_commands_what_they_tell_is_unknown_and_the_rest_is_no
     assert (analysis.totals["reacquired"], analysis.totals["reacquisition_median_s"]) == (1, None)
 
 
-def test_a_move_that_nobody_explained_is_of_unknown_kind():
+def test_a_move_that_nobody_explained_is_of_unknown_kind() -> None:
     story = Story().step().move(V, "correct: fine-tune v").move(U).done()
     assert story.analysed().timesteps[0].moves.kinds == {"correct: fine-tune v": 1, UNKNOWN: 1}
 
@@ -158,12 +163,13 @@ def test_a_move_that_nobody_explained_is_of_unknown_kind():
         (Motion(5e-5, 5e-5, 5e-5), (0, 0, 0)),
     ],
 )
-def test_a_move_of_several_legs_counts_for_each_of_its_axes(motion, axes):
+def test_a_move_of_several_legs_counts_for_each_of_its_axes(motion: Motion, axes: tuple[int, int, int]) -> None:
     moves = Story().step().move(motion, "correct: x").done().analysed().timesteps[0].moves
+    assert moves.axes is not None
     assert tuple(moves.axes.values()) == axes
 
 
-def test_a_run_without_timesteps_has_no_moves():
+def test_a_run_without_timesteps_has_no_moves() -> None:
     assert move_totals([], [], FollowerRecord("follower_1")) == {
         "moves_by_axis": {"u": 0, "v": 0, "turn": 0},
         "moves_by_kind": {},
@@ -181,7 +187,7 @@ def test_a_run_without_timesteps_has_no_moves():
         st.lists(st.sampled_from([(V, "correct: v"), (U, "correct: u"), (TURN, "search: s")]), max_size=4), max_size=5
     )
 )
-def test_kinds_and_axes_add_up_to_the_moves_of_every_timestep(steps):
+def test_kinds_and_axes_add_up_to_the_moves_of_every_timestep(steps: list[list[tuple[Motion, str]]]) -> None:
     story = Story().say("align").say("aligned")
     for entries in steps:
         story.step()
@@ -194,11 +200,12 @@ def test_kinds_and_axes_add_up_to_the_moves_of_every_timestep(steps):
         found.append(moves_of(follower, range(start, start + 1 + len(entries)), t))
         start += 1 + len(entries)
         assert found[-1].kinds == Counter(text for _, text in entries)
+        assert found[-1].axes is not None
         assert sum(found[-1].axes.values()) == len(entries)
     assert sum(summed(found).kinds.values()) == sum(map(len, steps))
 
 
-def test_the_report_tells_axes_kinds_and_losses():
+def test_the_report_tells_axes_kinds_and_losses() -> None:
     story = three_timesteps()
     record = RunRecord(tuple(story.leader), (story.follower(),))
     report = text_report(record, analyse(record))
@@ -209,7 +216,7 @@ def test_the_report_tells_axes_kinds_and_losses():
     assert "1, 1 of them reacquired (median 4.0 s, longest 4.0 s)" in report
 
 
-def test_a_bag_and_the_run_in_memory_give_the_same_analysis(tmp_path):
+def test_a_bag_and_the_run_in_memory_give_the_same_analysis(tmp_path: Path) -> None:
     settings = ["seed=2", "leader.timesteps=3", "world.camera.mode=on_demand", "world.overhead.enabled=false"]
     scenario = override(load_track("two"), settings)
     recorder = Recorder(tmp_path / "run", {"scenario": "track_two", "timesteps": "3", "outcome": "done"})

@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import matplotlib.image
 import pytest
@@ -20,7 +21,7 @@ from synthetic_bag import STEPS, write_run
 DETAILS = {"scenario": "track two", "predictor": "measured", "surface": "bowl", "seed": "3", "timesteps": "5"}
 
 
-def run_verb(*arguments):
+def run_verb(*arguments: object) -> int:
     parser = argparse.ArgumentParser()
     analyze.add_parser(parser.add_subparsers())
     args = parser.parse_args(["analyze", *map(str, arguments)])
@@ -28,11 +29,11 @@ def run_verb(*arguments):
 
 
 @pytest.fixture
-def bag(tmp_path):
+def bag(tmp_path: Path) -> Path:
     return write_run(tmp_path / "run", STEPS, details=DETAILS)
 
 
-def test_the_table_has_a_row_per_timestep_in_centimetres_and_degrees(bag):
+def test_the_table_has_a_row_per_timestep_in_centimetres_and_degrees(bag: Path) -> None:
     record = load_run(bag)
     lines = text_report(record, analyse(record)).splitlines()
     assert lines[0] == "track two: predictor measured, surface bowl, seed 3"
@@ -44,7 +45,7 @@ def test_the_table_has_a_row_per_timestep_in_centimetres_and_degrees(bag):
     assert max(map(len, lines)) <= 100
 
 
-def test_missing_values_are_dashes(bag):
+def test_missing_values_are_dashes(bag: Path) -> None:
     record = replace(load_run(bag), tracks={}, details={})
     lines = text_report(record, analyse(record)).splitlines()
     assert lines[0] == "formation run"
@@ -52,7 +53,7 @@ def test_missing_values_are_dashes(bag):
     assert "path                                 -" in lines
 
 
-def test_a_lost_run_is_told_with_its_unfinished_timestep(tmp_path):
+def test_a_lost_run_is_told_with_its_unfinished_timestep(tmp_path: Path) -> None:
     steps = [*STEPS[:4], replace(STEPS[0], finished=False)]
     record = load_run(write_run(tmp_path / "run", steps, details=DETAILS, lost=["follower_1"]))
     report = text_report(record, analyse(record))
@@ -60,14 +61,16 @@ def test_a_lost_run_is_told_with_its_unfinished_timestep(tmp_path):
     assert report.endswith("outcome: lost")
 
 
-def test_several_followers_have_a_section_each(tmp_path):
+def test_several_followers_have_a_section_each(tmp_path: Path) -> None:
     record = load_run(write_run(tmp_path / "run", STEPS, followers=2))
     report = text_report(record, analyse(record))
     assert report.index("\nfollower 1\n") < report.index("\nfollower 2\n")
     assert report.count("timesteps finished") == 2
 
 
-def test_the_verb_prints_the_table_and_draws_pictures_beside_the_bag(bag, capsys):
+def test_the_verb_prints_the_table_and_draws_pictures_beside_the_bag(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run_verb(bag) == 0
     said = capsys.readouterr()
     assert said.err == ""
@@ -82,7 +85,9 @@ def test_the_verb_prints_the_table_and_draws_pictures_beside_the_bag(bag, capsys
     assert run_verb(bag) == 0
 
 
-def test_json_is_alone_on_standard_output_and_draws_only_when_told_where(bag, tmp_path, capsys):
+def test_json_is_alone_on_standard_output_and_draws_only_when_told_where(
+    bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert run_verb(bag, "--json") == 0
     said = capsys.readouterr()
     found = json.loads(said.out)
@@ -97,14 +102,14 @@ def test_json_is_alone_on_standard_output_and_draws_only_when_told_where(bag, tm
     assert len(list((tmp_path / "pictures").iterdir())) == 2
 
 
-def test_a_lost_run_is_a_successful_analysis(tmp_path, capsys):
+def test_a_lost_run_is_a_successful_analysis(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = write_run(tmp_path / "run", STEPS, details=DETAILS, lost=["follower_1"])
     assert run_verb(bag, "--no-pictures") == 0
     assert capsys.readouterr().out.rstrip().endswith("outcome: lost")
     assert not bag.with_name("run_analysis").exists()
 
 
-def test_bad_input_raises_one_line(bag, tmp_path):
+def test_bad_input_raises_one_line(bag: Path, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for arguments in (
         [tmp_path / "nothing"],
@@ -116,24 +121,25 @@ def test_bad_input_raises_one_line(bag, tmp_path):
         assert "\n" not in str(caught.value)
 
 
-def test_pictures_are_drawn_for_every_kind_of_run(tmp_path):
+def test_pictures_are_drawn_for_every_kind_of_run(tmp_path: Path) -> None:
     steps = [*STEPS, replace(STEPS[0], finished=False)]
     lost = load_run(write_run(tmp_path / "lost", steps, followers=2, lost=["follower_2"]))
     bare = load_run(write_run(tmp_path / "bare", [], surface=False))
+    assert lost.ground is not None
     flat = replace(lost, ground=replace(lost.ground, vertices_m=lost.ground.vertices_m * (1, 1, 0)))
     for number, record in enumerate((lost, bare, flat, replace(lost, tracks={}))):
         pictures = write_pictures(record, analyse(record), tmp_path / str(number))
         assert all(picture.stat().st_size > 5000 for picture in pictures)
 
 
-def test_a_picture_that_cannot_be_written_is_told(bag, tmp_path):
+def test_a_picture_that_cannot_be_written_is_told(bag: Path, tmp_path: Path) -> None:
     record = load_run(bag)
     (tmp_path / "out" / "trajectory.png").mkdir(parents=True)
     with pytest.raises(AnalysisError, match="can't be written"):
         write_pictures(record, analyse(record), tmp_path / "out")
 
 
-def test_analysing_without_pictures_imports_neither_matplotlib_nor_ros(bag):
+def test_analysing_without_pictures_imports_neither_matplotlib_nor_ros(bag: Path) -> None:
     program = (
         "import argparse, pathlib, sys; from robot_formation.cli import analyze; "
         f"options = dict(bag=pathlib.Path({str(bag)!r}), out=None, json=True, no_pictures=True, namespace=None); "

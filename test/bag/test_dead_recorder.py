@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -51,16 +52,22 @@ except BagError as error:
 """
 
 
-def start(path, split_bytes=0, **options):
+def start(path: Path, split_bytes: int = 0, **options: Any) -> subprocess.Popen[str]:
     command = [sys.executable, "-c", WRITER, str(path), str(split_bytes)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
 
 
-def kill_and_recover(folder, lines, split_bytes):
+def line_of(process: subprocess.Popen[str]) -> str:
+    """The next line that a recorder prints."""
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
+def kill_and_recover(folder: Path, lines: int, split_bytes: int) -> None:
     """Kill a recorder after it has told so many ends of chunks; check what comes back."""
     process = start(folder / "run", split_bytes)
     for _ in range(lines):
-        told = int(process.stdout.readline())
+        told = int(line_of(process))
     process.send_signal(signal.SIGKILL)
     process.communicate()
     partial = folder / "run.partial"
@@ -74,34 +81,34 @@ def kill_and_recover(folder, lines, split_bytes):
         assert bag.metadata("robot_formation") == {"seed": "3"}
 
 
-def moments(count, seed):
+def moments(count: int, seed: int) -> list[int]:
     return random.Random(seed).sample(range(1, 120), count)
 
 
 @pytest.mark.parametrize("lines", moments(3, seed=1))
-def test_every_message_of_every_finished_chunk_survives_sigkill(tmp_path, lines):
+def test_every_message_of_every_finished_chunk_survives_sigkill(tmp_path: Path, lines: int) -> None:
     kill_and_recover(tmp_path, lines, split_bytes=0)
 
 
-def test_so_do_those_of_a_split_bag(tmp_path):
+def test_so_do_those_of_a_split_bag(tmp_path: Path) -> None:
     kill_and_recover(tmp_path, 100, split_bytes=20_000)
 
 
 @pytest.mark.parametrize("lines", moments(20, seed=2))
-def test_sigkill_at_twenty_moments(tmp_path, lines):
+def test_sigkill_at_twenty_moments(tmp_path: Path, lines: int) -> None:
     kill_and_recover(tmp_path, lines, split_bytes=random.Random(lines).choice([0, 50_000]))
 
 
-def test_a_bag_that_is_being_written_is_known_from_one_whose_writer_is_dead(tmp_path):
+def test_a_bag_that_is_being_written_is_known_from_one_whose_writer_is_dead(tmp_path: Path) -> None:
     process = start(tmp_path / "run")
-    process.stdout.readline()
+    line_of(process)
     assert is_being_written(tmp_path / "run.partial")
     process.kill()
     process.communicate()
     assert not is_being_written(tmp_path / "run.partial")
 
 
-def test_a_full_disk_is_told_in_one_line_and_leaves_a_bag_to_be_recovered(tmp_path):
+def test_a_full_disk_is_told_in_one_line_and_leaves_a_bag_to_be_recovered(tmp_path: Path) -> None:
     process = start(tmp_path / "run", preexec_fn=limit_file_size)
     told, error = process.communicate(timeout=60)
     assert process.returncode == 2
@@ -115,10 +122,10 @@ def test_a_full_disk_is_told_in_one_line_and_leaves_a_bag_to_be_recovered(tmp_pa
     assert ticks_of(tmp_path / "saved") == list(range(report.messages))
 
 
-def test_a_disk_that_is_full_during_recovery_leaves_the_old_bag_alone(tmp_path):
+def test_a_disk_that_is_full_during_recovery_leaves_the_old_bag_alone(tmp_path: Path) -> None:
     process = start(tmp_path / "run")
     for _ in range(100):
-        process.stdout.readline()
+        line_of(process)
     process.kill()
     process.communicate()
     code = (
@@ -134,7 +141,7 @@ def test_a_disk_that_is_full_during_recovery_leaves_the_old_bag_alone(tmp_path):
     assert Path(tmp_path / "run.partial" / "run_0.mcap").stat().st_size > 2000
 
 
-def test_the_oracle_of_these_tests_counts_what_was_written(tmp_path):
+def test_the_oracle_of_these_tests_counts_what_was_written(tmp_path: Path) -> None:
     from robot_formation.bag.qos import TopicQos
     from robot_formation.bag.writer import BagWriter
 

@@ -5,7 +5,9 @@ import os
 import shutil
 import sqlite3
 import struct
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -20,6 +22,7 @@ from robot_formation.bag.info import bag_info, info_text
 from robot_formation.bag.playback import make_excerpt
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import recover
+from robot_formation.bag.source import RawMessage
 from robot_formation.bag.transforms import Transforms
 from robot_formation.bag.writer import BagWriter
 from robot_formation.cli.main import main
@@ -31,7 +34,7 @@ MOVED = "/follower_1/moved"
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path: Path) -> Path:
     """A bag of a short run, as its folder."""
     with BagWriter(tmp_path / "run") as writer:
         made = SyntheticRun(writer)
@@ -40,7 +43,7 @@ def run(tmp_path):
     return tmp_path / "run"
 
 
-def edit_metadata(bag, change):
+def edit_metadata(bag: Path, change: Callable[[dict[str, Any]], object]) -> None:
     """Change a bag's metadata.yaml."""
     path = bag / "metadata.yaml"
     content = yaml.safe_load(path.read_text())
@@ -48,13 +51,13 @@ def edit_metadata(bag, change):
     path.write_text(yaml.safe_dump(content, sort_keys=False))
 
 
-def raw(bag):
+def raw(bag: Path) -> list[RawMessage]:
     """All messages of a bag."""
     with read_bag(bag) as opened:
         return list(opened.raw_messages(opened.topics))
 
 
-def as_sqlite(bag, target):
+def as_sqlite(bag: Path, target: Path) -> Path:
     """Write a bag's messages into an SQLite bag of rosbags; return its database."""
     with read_bag(bag) as opened, Writer(target, version=9, storage_plugin=StoragePlugin.SQLITE3) as out:
         there = {name: out.add_connection(name, kind, typestore=STORE) for name, kind in opened.topics.items()}
@@ -63,7 +66,7 @@ def as_sqlite(bag, target):
     return target / f"{target.name}.db3"
 
 
-def refused(function, *arguments):
+def refused(function: Callable[..., object], *arguments: object) -> str:
     """Return the one line with which a bag is refused."""
     with pytest.raises(BagError) as raised:
         function(*arguments)
@@ -73,10 +76,10 @@ def refused(function, *arguments):
     return said
 
 
-def test_a_reindexed_bag_is_read_completely(run, tmp_path):
+def test_a_reindexed_bag_is_read_completely(run: Path, tmp_path: Path) -> None:
     whole = raw(run)
 
-    def as_reindex_writes(information):
+    def as_reindex_writes(information: dict[str, Any]) -> None:
         for topic in information["topics_with_message_count"]:
             for profile in topic["topic_metadata"]["offered_qos_profiles"]:
                 profile.update(depth=10, history="unknown")
@@ -87,8 +90,8 @@ def test_a_reindexed_bag_is_read_completely(run, tmp_path):
     assert len(load_run(run).followers[0].displacements) == 3
 
 
-def test_metadata_that_count_other_messages_are_told(run, caplog):
-    def one_more(information):
+def test_metadata_that_count_other_messages_are_told(run: Path, caplog: pytest.LogCaptureFixture) -> None:
+    def one_more(information: dict[str, Any]) -> None:
         topic = next(t for t in information["topics_with_message_count"] if t["topic_metadata"]["name"] == MOVED)
         topic["message_count"] += 1
 
@@ -102,7 +105,7 @@ def test_metadata_that_count_other_messages_are_told(run, caplog):
     assert "reindex" in caplog.text
 
 
-def test_a_bag_that_holds_less_than_its_index_says_is_refused_while_it_is_read(run):
+def test_a_bag_that_holds_less_than_its_index_says_is_refused_while_it_is_read(run: Path) -> None:
     (file,) = run.glob("*.mcap")
     data = bytearray(file.read_bytes())
     footer = len(data) - 8 - 29
@@ -121,7 +124,9 @@ def test_a_bag_that_holds_less_than_its_index_says_is_refused_while_it_is_read(r
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite"])
-def test_bags_that_rosbag2_compressed_file_by_file_are_read(run, tmp_path, monkeypatch, storage):
+def test_bags_that_rosbag2_compressed_file_by_file_are_read(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, storage: str
+) -> None:
     whole = raw(run)
     if storage == "sqlite":
         as_sqlite(run, tmp_path / "other")
@@ -131,7 +136,7 @@ def test_bags_that_rosbag2_compressed_file_by_file_are_read(run, tmp_path, monke
     packed.write_bytes(zstandard.compress(file.read_bytes()))
     file.unlink()
 
-    def as_rosbag2_writes(information):
+    def as_rosbag2_writes(information: dict[str, Any]) -> None:
         information.update(compression_format="zstd", compression_mode="FILE", relative_file_paths=[packed.name])
 
     edit_metadata(run, as_rosbag2_writes)
@@ -148,7 +153,7 @@ def test_bags_that_rosbag2_compressed_file_by_file_are_read(run, tmp_path, monke
     assert list(scratch.iterdir()) == []
 
 
-def test_bags_whose_messages_were_compressed_one_by_one_are_read(run, tmp_path):
+def test_bags_whose_messages_were_compressed_one_by_one_are_read(run: Path, tmp_path: Path) -> None:
     whole = raw(run)
     target = tmp_path / "single"
     with BagWriter(target) as writer:
@@ -162,7 +167,7 @@ def test_bags_whose_messages_were_compressed_one_by_one_are_read(run, tmp_path):
     assert "compressed as 'lzma'" in refused(raw, target)
 
 
-def test_a_file_without_chunks_is_read(tmp_path):
+def test_a_file_without_chunks_is_read(tmp_path: Path) -> None:
     from mcap.writer import Writer as McapWriter
 
     path = tmp_path / "loose.mcap"
@@ -180,7 +185,7 @@ def test_a_file_without_chunks_is_read(tmp_path):
         assert [m.stamp_ns for m in bag.raw_messages({"/words"}, 5, 9)] == [5, 5]
 
 
-def test_equal_stamps_keep_the_order_of_their_writing_over_chunks(tmp_path):
+def test_equal_stamps_keep_the_order_of_their_writing_over_chunks(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as writer:
         for topic in ("/a", "/b"):
             writer.add_topic(topic, STRING, ())
@@ -195,7 +200,7 @@ def test_equal_stamps_keep_the_order_of_their_writing_over_chunks(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["bag_0.mcap", "bag_0.db3", "metadata.yaml"])
-def test_a_named_pipe_in_a_bag_is_refused_at_once(tmp_path, name):
+def test_a_named_pipe_in_a_bag_is_refused_at_once(tmp_path: Path, name: str) -> None:
     bag = tmp_path / "bag"
     bag.mkdir()
     os.mkfifo(bag / name)
@@ -205,7 +210,7 @@ def test_a_named_pipe_in_a_bag_is_refused_at_once(tmp_path, name):
         assert "Is a named pipe" in refused(recover, bag, tmp_path / "saved")
 
 
-def bomb(said):
+def bomb(said: int) -> bytes:
     """A chunk of a small file that unpacks to far more."""
     packer = zstandard.ZstdCompressor().compressobj(size=said)
     data = b"".join(packer.compress(bytes(1 << 24)) for _ in range(2)) + packer.flush()
@@ -213,20 +218,20 @@ def bomb(said):
 
 
 @pytest.mark.parametrize(("frame_says", "chunk_says"), [(-1, 1000), (2 << 24, 1000), (-1, 2**40), (2 << 24, 2**40)])
-def test_chunks_that_unpack_to_more_than_they_may_are_refused(frame_says, chunk_says):
+def test_chunks_that_unpack_to_more_than_they_may_are_refused(frame_says: int, chunk_says: int) -> None:
     packed = bomb(frame_says)
     assert len(packed) < 10_000
     said = refused(mcap_chunks.unpacked, packed, "zstd", chunk_says)
     assert "more than" in said or "damaged" in said
 
 
-def test_a_message_that_unpacks_to_more_than_it_may_is_refused(monkeypatch):
+def test_a_message_that_unpacks_to_more_than_it_may_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mcap_chunks, "MOST_BYTES", 1000)
     for frame_says in (-1, 2 << 24):
         refused(mcap_chunks.unpacked_message, bomb(frame_says))
 
 
-def test_lz4_chunks_are_unpacked_up_to_what_they_say():
+def test_lz4_chunks_are_unpacked_up_to_what_they_say() -> None:
     import lz4.frame
 
     packed = lz4.frame.compress(bytes(10_000))
@@ -245,7 +250,7 @@ def test_lz4_chunks_are_unpacked_up_to_what_they_say():
         ("UPDATE topics SET offered_qos_profiles = '- history: 1'", "depth"),
     ],
 )
-def test_databases_with_values_of_other_types_are_refused(run, tmp_path, statement, said):
+def test_databases_with_values_of_other_types_are_refused(run: Path, tmp_path: Path, statement: str, said: str) -> None:
     database = as_sqlite(run, tmp_path / "other")
     with sqlite3.connect(database) as opened:
         rows = {name: opened.execute(f"SELECT * FROM {name}").fetchall() for name in ("topics", "messages")}
@@ -258,7 +263,7 @@ def test_databases_with_values_of_other_types_are_refused(run, tmp_path, stateme
     assert said in refused(raw, tmp_path / "other")
 
 
-def test_qos_that_cannot_be_read_is_told_and_costs_no_message(tmp_path):
+def test_qos_that_cannot_be_read_is_told_and_costs_no_message(tmp_path: Path) -> None:
     from mcap.writer import Writer as McapWriter
 
     path = tmp_path / "bag.mcap"
@@ -276,7 +281,7 @@ def test_qos_that_cannot_be_read_is_told_and_costs_no_message(tmp_path):
     assert recover(path, tmp_path / "saved").messages == 1
 
 
-def test_a_type_with_other_fields_than_in_jazzy_is_refused(tmp_path):
+def test_a_type_with_other_fields_than_in_jazzy_is_refused(tmp_path: Path) -> None:
     from mcap.writer import Writer as McapWriter
 
     path = tmp_path / "bag.mcap"
@@ -289,7 +294,7 @@ def test_a_type_with_other_fields_than_in_jazzy_is_refused(tmp_path):
     assert "with other fields than in ROS 2 Jazzy" in refused(load_run, path)
 
 
-def test_a_bag_whose_displacements_are_missing_is_no_log(tmp_path):
+def test_a_bag_whose_displacements_are_missing_is_no_log(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run") as writer:
         SyntheticRun(writer)
     with pytest.raises(AnalysisError, match="no displacements"):
@@ -307,14 +312,14 @@ def test_a_bag_whose_displacements_are_missing_is_no_log(tmp_path):
         lambda said: said.update(relative_file_paths=["/etc/passwd"]),
     ],
 )
-def test_wrong_metadata_are_refused_in_one_line(run, change):
+def test_wrong_metadata_are_refused_in_one_line(run: Path, change: Callable[[dict[str, Any]], object]) -> None:
     edit_metadata(run, change)
     said = refused(read_bag, run)
     assert str(run) in said
     assert "reindex" in said
 
 
-def test_descriptions_with_entities_and_broken_numbers_give_no_frames():
+def test_descriptions_with_entities_and_broken_numbers_give_no_frames() -> None:
     entities = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10}">' for n in range(1, 12))
     hostile = f'<!DOCTYPE r [<!ENTITY e0 "x">{entities}]><robot><joint name="&e11;"/></robot>'
     broken = '<robot><joint><parent link="a"/><child link="b"/><origin xyz="1 2" rpy="0 0 x"/></joint></robot>'
@@ -325,7 +330,9 @@ def test_descriptions_with_entities_and_broken_numbers_give_no_frames():
         assert list(transforms.make()) == []
 
 
-def test_the_verbs_end_with_one_line_and_code_2_on_a_cut_off_record(run, tmp_path, capsys):
+def test_the_verbs_end_with_one_line_and_code_2_on_a_cut_off_record(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (file,) = run.glob("*.mcap")
     data = file.read_bytes()
     broken = tmp_path / "broken"

@@ -1,6 +1,7 @@
 """The queue before the disk keeps order, tells what it drops and what goes wrong, and never makes its user wait."""
 
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -14,21 +15,21 @@ from synthetic_bag import STORE, text
 STRING = "std_msgs/msg/String"
 
 
-def cdr(words):
+def cdr(words: str) -> bytes:
     return bytes(STORE.serialize_cdr(text(words), STRING))
 
 
-def words_in(path):
+def words_in(path: Path) -> list[str]:
     with read_bag(path) as bag:
         return [message.message.data for message in bag.messages(["/words"])]
 
 
 @pytest.fixture
-def recorder(tmp_path):
+def recorder(tmp_path: Path) -> Recorder:
     return Recorder(tmp_path / "bag", {})
 
 
-def test_messages_and_actions_keep_their_order(recorder):
+def test_messages_and_actions_keep_their_order(recorder: Recorder) -> None:
     queue = RecordingQueue(recorder)
     queue.call(lambda: recorder.add_topic("/words", STRING, TopicQos()))
     assert all(queue.put("/words", STRING, cdr(f"{number}")) for number in range(200))
@@ -38,7 +39,7 @@ def test_messages_and_actions_keep_their_order(recorder):
     assert words_in(recorder.close()) == [f"{number}" for number in range(200)]
 
 
-def test_what_does_not_fit_is_dropped_and_counted_by_topic(recorder):
+def test_what_does_not_fit_is_dropped_and_counted_by_topic(recorder: Recorder) -> None:
     recorder.add_topic("/words", STRING, TopicQos())
     queue = RecordingQueue(recorder, queue_bytes=1000)
     disk = threading.Event()
@@ -52,7 +53,7 @@ def test_what_does_not_fit_is_dropped_and_counted_by_topic(recorder):
     assert len(words_in(recorder.close())) == 3
 
 
-def test_a_message_larger_than_the_queue_goes_in_alone(recorder):
+def test_a_message_larger_than_the_queue_goes_in_alone(recorder: Recorder) -> None:
     recorder.add_topic("/words", STRING, TopicQos())
     queue = RecordingQueue(recorder, queue_bytes=1000)
     assert queue.put("/words", STRING, cdr("x" * 5000))
@@ -60,7 +61,7 @@ def test_a_message_larger_than_the_queue_goes_in_alone(recorder):
     assert len(words_in(recorder.close())) == 1
 
 
-def test_after_an_error_on_the_disk_nothing_is_taken_and_whoever_asks_is_told(recorder):
+def test_after_an_error_on_the_disk_nothing_is_taken_and_whoever_asks_is_told(recorder: Recorder) -> None:
     queue = RecordingQueue(recorder)
     queue.put("/unknown", STRING, cdr("x"))
     queue.stop()
@@ -74,7 +75,7 @@ def test_after_an_error_on_the_disk_nothing_is_taken_and_whoever_asks_is_told(re
     recorder.close()
 
 
-def test_a_defect_ends_the_recording_and_is_named(recorder):
+def test_a_defect_ends_the_recording_and_is_named(recorder: Recorder) -> None:
     queue = RecordingQueue(recorder)
     queue.call(lambda: 1 / 0)
     with pytest.raises(BagError, match="the recorder failed: ZeroDivisionError"):

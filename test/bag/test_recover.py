@@ -1,6 +1,7 @@
 """A bag cut off anywhere gives back every chunk that was closed before the cut, and bad bags are told in one line."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 from mcap.writer import Writer as McapWriter
@@ -19,7 +20,7 @@ CHUNKS = 4
 PER_CHUNK = 5
 
 
-def write_chunks(path, compression="zstd"):
+def write_chunks(path: Path, compression: str = "zstd") -> list[int]:
     """Write a bag; return its file's size after each closed chunk."""
     sizes = []
     with BagWriter(path, compression=compression) as writer:
@@ -34,7 +35,7 @@ def write_chunks(path, compression="zstd"):
     return sizes
 
 
-def cut(bag, size):
+def cut(bag: Path, size: int) -> Path:
     """Make the `.partial` folder that a writer killed at this file size would have left."""
     partial = bag.with_name("cut.partial")
     shutil.rmtree(partial, ignore_errors=True)
@@ -43,13 +44,13 @@ def cut(bag, size):
     return partial
 
 
-def messages(bag):
+def messages(bag: Path) -> list[tuple[str, int, bytes]]:
     with AnyReader([bag]) as reader:
         return [(c.topic, stamp, bytes(data)) for c, stamp, data in reader.messages()]
 
 
 @pytest.mark.parametrize("compression", ["zstd", "none"])
-def test_every_closed_chunk_comes_back_wherever_the_file_is_cut(tmp_path, compression):
+def test_every_closed_chunk_comes_back_wherever_the_file_is_cut(tmp_path: Path, compression: str) -> None:
     sizes = write_chunks(tmp_path / "run", compression)
     whole = messages(tmp_path / "run")
     total = (tmp_path / "run" / "run_0.mcap").stat().st_size
@@ -65,7 +66,7 @@ def test_every_closed_chunk_comes_back_wherever_the_file_is_cut(tmp_path, compre
         shutil.rmtree(out)
 
 
-def test_the_report_tells_what_was_saved_and_what_not(tmp_path):
+def test_the_report_tells_what_was_saved_and_what_not(tmp_path: Path) -> None:
     sizes = write_chunks(tmp_path / "run")
     partial = cut(tmp_path / "run", sizes[1] + 20)
     report = recover(partial, tmp_path / "saved")
@@ -78,7 +79,7 @@ def test_the_report_tells_what_was_saved_and_what_not(tmp_path):
     assert (whole.messages, whole.complete, whole.lost_bytes) == (CHUNKS * PER_CHUNK, True, 0)
 
 
-def test_a_damaged_chunk_is_left_out_and_counted(tmp_path):
+def test_a_damaged_chunk_is_left_out_and_counted(tmp_path: Path) -> None:
     sizes = write_chunks(tmp_path / "run")
     file = tmp_path / "run" / "run_0.mcap"
     data = bytearray(file.read_bytes())
@@ -89,7 +90,7 @@ def test_a_damaged_chunk_is_left_out_and_counted(tmp_path):
     assert report.messages == (CHUNKS - 1) * PER_CHUNK
 
 
-def test_recovered_bags_keep_qos_types_and_hashes(tmp_path):
+def test_recovered_bags_keep_qos_types_and_hashes(tmp_path: Path) -> None:
     sizes = write_chunks(tmp_path / "run")
     recover(cut(tmp_path / "run", sizes[0]), tmp_path / "saved")
     connections = []
@@ -100,7 +101,7 @@ def test_recovered_bags_keep_qos_types_and_hashes(tmp_path):
     assert connections[0] == connections[1]
 
 
-def test_recovery_keeps_the_log_times_of_another_recorder(tmp_path):
+def test_recovery_keeps_the_log_times_of_another_recorder(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run") as writer:
         writer.add_topic("/words", STRING, TopicQos())
         for log_time in (7, 9, 9):
@@ -109,7 +110,9 @@ def test_recovery_keeps_the_log_times_of_another_recorder(tmp_path):
     assert [stamp for _, stamp, _ in messages(tmp_path / "saved")] == [7, 9, 9]
 
 
-def test_an_unclosed_bag_is_read_like_a_finished_one_and_leaves_nothing_behind(tmp_path, monkeypatch):
+def test_an_unclosed_bag_is_read_like_a_finished_one_and_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(scratch))
@@ -122,7 +125,7 @@ def test_an_unclosed_bag_is_read_like_a_finished_one_and_leaves_nothing_behind(t
         assert list(scratch.iterdir()) == []
 
 
-def test_a_finished_bag_is_read_as_folder_and_as_file(tmp_path):
+def test_a_finished_bag_is_read_as_folder_and_as_file(tmp_path: Path) -> None:
     write_chunks(tmp_path / "run")
     for path in (tmp_path / "run", tmp_path / "run" / "run_0.mcap"):
         with read_bag(path) as bag:
@@ -138,7 +141,7 @@ def test_a_finished_bag_is_read_as_folder_and_as_file(tmp_path):
                 bag.require({"/words": "std_msgs/msg/UInt32"})
 
 
-def make_bad(tmp_path, kind):
+def make_bad(tmp_path: Path, kind: str) -> Path:
     path = tmp_path / "bad"
     if kind == "missing":
         return path
@@ -182,13 +185,13 @@ def make_bad(tmp_path, kind):
         ("metadata", "no valid YAML in line 2"),
     ],
 )
-def test_bad_bags_are_told_in_one_line(tmp_path, kind, says):
+def test_bad_bags_are_told_in_one_line(tmp_path: Path, kind: str, says: str) -> None:
     with pytest.raises(BagError, match=says) as caught:
         read_bag(make_bad(tmp_path, kind))
     assert "\n" not in str(caught.value)
 
 
-def test_a_finished_bag_whose_file_was_cut_off_is_read_up_to_there(tmp_path):
+def test_a_finished_bag_whose_file_was_cut_off_is_read_up_to_there(tmp_path: Path) -> None:
     write_chunks(tmp_path / "run")
     file = tmp_path / "run" / "run_0.mcap"
     file.write_bytes(file.read_bytes()[:-300])
@@ -197,7 +200,7 @@ def test_a_finished_bag_whose_file_was_cut_off_is_read_up_to_there(tmp_path):
         assert bag.message_count > 0
 
 
-def test_a_chunk_damaged_inside_a_finished_bag_is_told_while_reading(tmp_path):
+def test_a_chunk_damaged_inside_a_finished_bag_is_told_while_reading(tmp_path: Path) -> None:
     sizes = write_chunks(tmp_path / "run")
     file = tmp_path / "run" / "run_0.mcap"
     data = bytearray(file.read_bytes())
@@ -208,7 +211,7 @@ def test_a_chunk_damaged_inside_a_finished_bag_is_told_while_reading(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["missing", "folder", "no mcap", "other mcap", "nothing saved"])
-def test_recover_refuses_what_is_no_bag_and_makes_nothing(tmp_path, kind):
+def test_recover_refuses_what_is_no_bag_and_makes_nothing(tmp_path: Path, kind: str) -> None:
     source = make_bad(tmp_path, kind)
     with pytest.raises(BagError):
         recover(source, tmp_path / "saved")
@@ -216,12 +219,12 @@ def test_recover_refuses_what_is_no_bag_and_makes_nothing(tmp_path, kind):
     assert not (tmp_path / "saved.partial").exists()
 
 
-def test_recover_overwrites_nothing(tmp_path):
+def test_recover_overwrites_nothing(tmp_path: Path) -> None:
     write_chunks(tmp_path / "run")
     (tmp_path / "saved").mkdir()
     with pytest.raises(BagError, match="not overwritten"):
         recover(tmp_path / "run", tmp_path / "saved")
 
 
-def test_a_bags_name_has_no_suffix(tmp_path):
+def test_a_bags_name_has_no_suffix(tmp_path: Path) -> None:
     assert {bag_name(tmp_path / name) for name in ("run", "run.partial", "run.mcap", "run.db3")} == {"run"}

@@ -1,5 +1,8 @@
 """A bag is split by size or by log time, and its parts are one bag again for readers of every make."""
 
+from pathlib import Path
+from typing import Any
+
 import pytest
 import yaml
 from mcap.reader import make_reader
@@ -17,11 +20,11 @@ STRING = "std_msgs/msg/String"
 SECOND = 10**9
 
 
-def cdr(words):
+def cdr(words: str) -> bytes:
     return bytes(STORE.serialize_cdr(text(words), STRING))
 
 
-def write(path, options, count=24, size=1000):
+def write(path: Path, options: WriteOptions, count: int = 24, size: int = 1000) -> Path:
     with BagWriter(path, options=options) as writer:
         writer.add_topic("/words", STRING, TopicQos(history="keep_all", depth=0))
         writer.write_metadata("robot_formation", {"seed": "3"})
@@ -34,7 +37,7 @@ def write(path, options, count=24, size=1000):
     return path
 
 
-def information(bag):
+def information(bag: Path) -> Any:
     return yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
 
 
@@ -46,7 +49,7 @@ SPLITS = [
 
 
 @pytest.mark.parametrize(("options", "files"), SPLITS)
-def test_the_parts_are_counted_and_timed_in_the_metadata(tmp_path, options, files):
+def test_the_parts_are_counted_and_timed_in_the_metadata(tmp_path: Path, options: WriteOptions, files: int) -> None:
     found = information(write(tmp_path / "run", options))
     names = [f"run_{number}.mcap" for number in range(files)]
     assert found["relative_file_paths"] == [file["path"] for file in found["files"]] == names
@@ -61,7 +64,7 @@ def test_the_parts_are_counted_and_timed_in_the_metadata(tmp_path, options, file
 
 
 @pytest.mark.parametrize(("options", "files"), SPLITS)
-def test_readers_of_other_makes_and_ours_see_one_bag(tmp_path, options, files):
+def test_readers_of_other_makes_and_ours_see_one_bag(tmp_path: Path, options: WriteOptions, files: int) -> None:
     bag = write(tmp_path / "run", options)
     with AnyReader([bag]) as reader:
         theirs = [(c.topic, stamp) for c, stamp, _ in reader.messages()]
@@ -73,18 +76,18 @@ def test_readers_of_other_makes_and_ours_see_one_bag(tmp_path, options, files):
     assert bag_info(bag).files == tuple(f"run_{number}.mcap" for number in range(files))
 
 
-def test_every_part_can_be_read_alone(tmp_path):
+def test_every_part_can_be_read_alone(tmp_path: Path) -> None:
     bag = write(tmp_path / "run", WriteOptions(split_ns=2 * SECOND))
     for file in sorted(bag.glob("*.mcap")):
         with file.open("rb") as stream:
             reader = make_reader(stream, validate_crcs=True)
             assert [record.name for record in reader.iter_metadata()] == ["robot_formation", "rosbag2"]
-            assert all(schema.data for schema, _, _ in reader.iter_messages())
+            assert all(schema is not None and schema.data for schema, _, _ in reader.iter_messages())
         with read_bag(file) as part:
             assert part.metadata("robot_formation") == {"seed": "3"}
 
 
-def test_a_split_bag_that_was_cut_off_is_recovered_in_the_order_of_its_numbers(tmp_path):
+def test_a_split_bag_that_was_cut_off_is_recovered_in_the_order_of_its_numbers(tmp_path: Path) -> None:
     bag = write(tmp_path / "run", WriteOptions(split_ns=1), count=12)
     partial = tmp_path / "cut.partial"
     bag.rename(partial)
@@ -101,13 +104,13 @@ def test_a_split_bag_that_was_cut_off_is_recovered_in_the_order_of_its_numbers(t
     assert stamps == [number * SECOND for number in range(11)]
 
 
-def test_what_an_option_cannot_be_is_told(tmp_path):
+def test_what_an_option_cannot_be_is_told(tmp_path: Path) -> None:
     with pytest.raises(BagError, match="compression can't be 'gzip'"):
         BagWriter(tmp_path / "run", options=WriteOptions(compression="gzip"))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_chunk_is_ended_by_itself_and_survives(tmp_path):
+def test_a_full_chunk_is_ended_by_itself_and_survives(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "run", options=WriteOptions(chunk_bytes=4096))
     writer.add_topic("/words", STRING, TopicQos())
     for number in range(10):

@@ -1,15 +1,19 @@
 """/tf and /tf_static in a run's bag, and what a bag without true poses has instead."""
 
 import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 import pytest
 from rosbags.highlevel import AnyReader
+from rosbags.interfaces import ConnectionExtRosbag2
 
 from graph_tools import short_scenario
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.message_recorder import Recorder
 from robot_formation.bag.qos import TopicQos
-from robot_formation.bag.reader import read_bag
+from robot_formation.bag.reader import BagMessage, read_bag
 from robot_formation.bag.transforms import Transforms
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.launching.processes import run_metadata
@@ -20,11 +24,11 @@ from synthetic_bag import STORE, odometry, text
 ODOMETRY, STRING = "nav_msgs/msg/Odometry", "std_msgs/msg/String"
 
 
-def cdr(message):
+def cdr(message: Any) -> bytes:
     return bytes(STORE.serialize_cdr(message, message.__msgtype__))
 
 
-def decoded(messages):
+def decoded(messages: Iterable[Any]) -> list[tuple[str, Any, int]]:
     return [
         (topic.name, STORE.deserialize_cdr(data, "tf2_msgs/msg/TFMessage"), stamp_ns)
         for topic, data, stamp_ns in messages
@@ -32,23 +36,23 @@ def decoded(messages):
 
 
 @pytest.fixture(scope="module")
-def bag(tmp_path_factory):
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scenario = short_scenario("leader.timesteps=1")
     path = tmp_path_factory.mktemp("tf") / "bag"
     run_in_process(scenario, path, run_metadata(scenario))
     return path
 
 
-def messages_of(bag, *topics):
+def messages_of(bag: Path, *topics: str) -> list[BagMessage]:
     with read_bag(bag) as opened:
         return list(opened.messages(topics))
 
 
-def test_every_true_pose_of_a_run_is_a_transform_of_its_time(bag):
+def test_every_true_pose_of_a_run_is_a_transform_of_its_time(bag: Path) -> None:
     poses = messages_of(bag, "/ground_truth/leader/odom", "/ground_truth/follower_1/odom")
     transforms = messages_of(bag, "/tf")
 
-    def key(header, child, place, turn):
+    def key(header: Any, child: str, place: Any, turn: Any) -> tuple[float | str, ...]:
         return (header.stamp.sec, header.stamp.nanosec, child, place.x, place.y, place.z, turn.z, turn.w)
 
     expected = [
@@ -66,7 +70,7 @@ def test_every_true_pose_of_a_run_is_a_transform_of_its_time(bag):
     assert sorted(found) == sorted(expected)
 
 
-def test_the_fixed_frames_are_one_message_at_the_start_and_make_one_tree(bag):
+def test_the_fixed_frames_are_one_message_at_the_start_and_make_one_tree(bag: Path) -> None:
     (message,) = messages_of(bag, "/tf_static")
     assert message.stamp_ns == 0
     parents = {entry.child_frame_id: entry.header.frame_id for entry in message.message.transforms}
@@ -83,14 +87,16 @@ def test_the_fixed_frames_are_one_message_at_the_start_and_make_one_tree(bag):
         assert math.hypot(q.x, q.y, q.z, q.w) == pytest.approx(1.0)
 
 
-def test_a_reader_of_another_make_finds_type_and_latched_qos(bag):
+def test_a_reader_of_another_make_finds_type_and_latched_qos(bag: Path) -> None:
     with AnyReader([bag]) as reader:
         found = {connection.topic: connection for connection in reader.connections}
         assert found["/tf"].msgtype == found["/tf_static"].msgtype == "tf2_msgs/msg/TFMessage"
-        assert found["/tf_static"].ext.offered_qos_profiles[0].durability.name == "TRANSIENT_LOCAL"
+        static = found["/tf_static"].ext
+        assert isinstance(static, ConnectionExtRosbag2)
+        assert static.offered_qos_profiles[0].durability.name == "TRANSIENT_LOCAL"
 
 
-def test_the_robots_start_is_its_odom_frame():
+def test_the_robots_start_is_its_odom_frame() -> None:
     made = Transforms()
     for stamp_ns, x in ((0, 0.5), (10**9, 0.7)):
         message = odometry(stamp_ns, x, 0.2, 0.3)
@@ -105,7 +111,7 @@ def test_the_robots_start_is_its_odom_frame():
     assert list(made.make()) == []
 
 
-def test_fixed_frames_that_come_later_are_told_with_all_others():
+def test_fixed_frames_that_come_later_are_told_with_all_others() -> None:
     made = Transforms()
     description = robot_description("leader", WorldParameters(), camera=True)
     made.take("/leader/robot_description", STRING, cdr(text(description)), 0)
@@ -116,7 +122,7 @@ def test_fixed_frames_that_come_later_are_told_with_all_others():
     assert stamp_ns == 5
 
 
-def test_other_topics_and_texts_that_are_no_urdf_give_nothing():
+def test_other_topics_and_texts_that_are_no_urdf_give_nothing() -> None:
     made = Transforms()
     made.take("/leader/odom", ODOMETRY, cdr(odometry(0, 1.0, 0.0, 0.0)), 0)
     made.take("/leader/alignment", STRING, cdr(text("<robot/>")), 0)
@@ -125,7 +131,7 @@ def test_other_topics_and_texts_that_are_no_urdf_give_nothing():
     assert list(made.make()) == []
 
 
-def test_transforms_that_somebody_publishes_are_left_alone(tmp_path):
+def test_transforms_that_somebody_publishes_are_left_alone(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "bag", {})
     recorder.add_topic("/tf", "tf2_msgs/msg/TFMessage", TopicQos())
     recorder.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
@@ -135,7 +141,7 @@ def test_transforms_that_somebody_publishes_are_left_alone(tmp_path):
     assert len(messages_of(tmp_path / "bag", "/tf_static")) == 1
 
 
-def test_a_closed_chunk_has_its_transforms(tmp_path):
+def test_a_closed_chunk_has_its_transforms(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "bag", {})
     recorder.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
     recorder.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(0, 1.0, 0.0, 0.0)))
@@ -144,7 +150,7 @@ def test_a_closed_chunk_has_its_transforms(tmp_path):
     recorder.close()
 
 
-def test_a_publisher_that_appears_while_transforms_are_made_is_recorded_beside_them(tmp_path):
+def test_a_publisher_that_appears_while_transforms_are_made_is_recorded_beside_them(tmp_path: Path) -> None:
     foreign = STORE.types["tf2_msgs/msg/TFMessage"]([])
     with_robot = Recorder(tmp_path / "bag", {})
     with_robot.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
@@ -158,7 +164,7 @@ def test_a_publisher_that_appears_while_transforms_are_made_is_recorded_beside_t
     assert sorted(found) == [[], ["base_link"], ["base_link"]]
 
 
-def test_a_topic_of_the_recorders_own_keeps_its_type(tmp_path):
+def test_a_topic_of_the_recorders_own_keeps_its_type(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "bag", {})
     recorder.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
     recorder.record("/ground_truth/leader/odom", ODOMETRY, cdr(odometry(10**9, 1.0, 0.0, 0.0)))
@@ -168,7 +174,7 @@ def test_a_topic_of_the_recorders_own_keeps_its_type(tmp_path):
     recorder.close()
 
 
-def test_poses_that_cannot_be_decoded_give_no_transforms(tmp_path):
+def test_poses_that_cannot_be_decoded_give_no_transforms(tmp_path: Path) -> None:
     with_robot = Recorder(tmp_path / "bag", {})
     with_robot.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
     for data in (b"\x00\x01\x00\x00", b"\x00\x01\x00\x00" + b"\xff" * 40):
@@ -178,7 +184,7 @@ def test_poses_that_cannot_be_decoded_give_no_transforms(tmp_path):
         assert [message.topic for message in opened.raw_messages(opened.topics)] == ["/ground_truth/leader/odom"] * 2
 
 
-def test_a_topic_of_another_type_that_was_there_first_keeps_its_messages(tmp_path):
+def test_a_topic_of_another_type_that_was_there_first_keeps_its_messages(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "bag", {})
     recorder.add_topic("/tf", STRING, TopicQos())
     recorder.add_topic("/ground_truth/leader/odom", ODOMETRY, TopicQos())
@@ -187,7 +193,7 @@ def test_a_topic_of_another_type_that_was_there_first_keeps_its_messages(tmp_pat
     assert messages_of(tmp_path / "bag", "/tf") == []
 
 
-def test_each_formations_transforms_lie_in_its_namespace():
+def test_each_formations_transforms_lie_in_its_namespace() -> None:
     made = Transforms()
     for namespace, x in (("", 0.1), ("/site_a", 0.2)):
         message = odometry(0, x, 0.2, 0.3)

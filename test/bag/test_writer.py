@@ -8,6 +8,7 @@ import subprocess
 import sys
 import sysconfig
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -30,11 +31,11 @@ POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 INFINITE = QosTime(9223372036, 854775807)
 
 
-def cdr(message):
+def cdr(message: Any) -> bytes:
     return bytes(STORE.serialize_cdr(message, message.__msgtype__))
 
 
-def write_sample(path, **options):
+def write_sample(path: Path, **options: Any) -> Path:
     with BagWriter(path, **options) as writer:
         writer.add_topic("/words", STRING, TopicQos(history="keep_all", depth=0))
         writer.add_topic("/pose", POSE, TopicQos(durability="transient_local", depth=1))
@@ -48,8 +49,8 @@ def write_sample(path, **options):
     return path
 
 
-def write_by_rosbags(path):
-    def qos(history, depth, durability):
+def write_by_rosbags(path: Path) -> Path:
+    def qos(history: Any, depth: int, durability: Any) -> list[Any]:
         reliable = QosReliability.RELIABLE
         automatic = QosLiveliness.AUTOMATIC
         return [Qos(history, depth, reliable, durability, INFINITE, INFINITE, automatic, INFINITE, False)]
@@ -81,13 +82,15 @@ def write_by_rosbags(path):
     return path
 
 
-def information(bag):
+def information(bag: Path) -> Any:
     return yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
 
 
-def test_rosbags_reads_topics_types_stamps_and_payload(tmp_path):
+def test_rosbags_reads_topics_types_stamps_and_payload(tmp_path: Path) -> None:
     with AnyReader([write_sample(tmp_path / "run")]) as reader:
-        read = [(c.topic, stamp, reader.deserialize(data, c.msgtype)) for c, stamp, data in reader.messages()]
+        read: list[tuple[str, int, Any]] = [
+            (c.topic, stamp, reader.deserialize(data, c.msgtype)) for c, stamp, data in reader.messages()
+        ]
         assert {c.topic for c in reader.connections} == {"/words", "/pose", "/silent"}
     words = [(stamp, message.data) for topic, stamp, message in read if topic == "/words"]
     assert words == [(1000 + n, f"word {n}") for n in range(10)]
@@ -95,12 +98,13 @@ def test_rosbags_reads_topics_types_stamps_and_payload(tmp_path):
     assert forward == [0.1 * n for n in range(10)]
 
 
-def test_the_mcap_reader_finds_profile_schemas_channel_metadata_and_records(tmp_path):
+def test_the_mcap_reader_finds_profile_schemas_channel_metadata_and_records(tmp_path: Path) -> None:
     path = write_sample(tmp_path / "run") / "run_0.mcap"
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         assert reader.get_header().profile == "ros2"
         summary = reader.get_summary()
+        assert summary is not None
         assert {s.name: s.encoding for s in summary.schemas.values()} == {
             STRING: "ros2msg",
             POSE: "ros2msg",
@@ -119,13 +123,13 @@ def test_the_mcap_reader_finds_profile_schemas_channel_metadata_and_records(tmp_
     assert len(summary.chunk_indexes) == 4
 
 
-def test_every_schema_carries_the_types_that_it_is_made_of():
+def test_every_schema_carries_the_types_that_it_is_made_of() -> None:
     body = definition("tf2_msgs/msg/TFMessage").text
     for part in ("geometry_msgs/TransformStamped", "geometry_msgs/Transform", "std_msgs/Header"):
         assert f"{'=' * 80}\nMSG: {part}\n" in body
 
 
-def test_metadata_yaml_equals_that_of_rosbags_but_for_names_and_distribution(tmp_path):
+def test_metadata_yaml_equals_that_of_rosbags_but_for_names_and_distribution(tmp_path: Path) -> None:
     ours = information(write_sample(tmp_path / "run"))
     theirs = information(write_by_rosbags(tmp_path / "reference"))
     assert ours.pop("ros_distro") == "jazzy"
@@ -135,7 +139,7 @@ def test_metadata_yaml_equals_that_of_rosbags_but_for_names_and_distribution(tmp
     assert ours == theirs
 
 
-def test_the_bags_keys_come_in_rosbag2s_order_and_inside_the_mcap_too(tmp_path):
+def test_the_bags_keys_come_in_rosbag2s_order_and_inside_the_mcap_too(tmp_path: Path) -> None:
     bag = write_sample(tmp_path / "run")
     expected = [
         "version",
@@ -157,7 +161,7 @@ def test_the_bags_keys_come_in_rosbag2s_order_and_inside_the_mcap_too(tmp_path):
     assert yaml.safe_load(record.metadata["serialized_metadata"]) == information(bag)
 
 
-def test_an_empty_bag_has_rosbag2s_starting_time_and_opens(tmp_path):
+def test_an_empty_bag_has_rosbag2s_starting_time_and_opens(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run") as writer:
         writer.add_topic("/words", STRING, TopicQos())
     assert information(tmp_path / "run")["starting_time"] == {"nanoseconds_since_epoch": 2**63 - 1}
@@ -166,12 +170,12 @@ def test_an_empty_bag_has_rosbag2s_starting_time_and_opens(tmp_path):
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
-def test_each_compression_is_read_back(tmp_path, compression):
+def test_each_compression_is_read_back(tmp_path: Path, compression: str) -> None:
     with AnyReader([write_sample(tmp_path / "run", compression=compression)]) as reader:
         assert reader.message_count == 20
 
 
-def test_equal_stamps_of_one_topic_get_distinct_log_times_in_order(tmp_path):
+def test_equal_stamps_of_one_topic_get_distinct_log_times_in_order(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run") as writer:
         writer.add_topic("/words", STRING, TopicQos())
         writer.add_topic("/other", STRING, TopicQos())
@@ -192,7 +196,7 @@ def test_equal_stamps_of_one_topic_get_distinct_log_times_in_order(tmp_path):
     ]
 
 
-def test_the_bag_is_partial_until_it_is_closed(tmp_path):
+def test_the_bag_is_partial_until_it_is_closed(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "run")
     assert (tmp_path / "run.partial").is_dir()
     assert not (tmp_path / "run").exists()
@@ -203,7 +207,7 @@ def test_the_bag_is_partial_until_it_is_closed(tmp_path):
         writer.end_chunk()
 
 
-def test_an_exception_in_the_block_still_leaves_a_complete_bag(tmp_path):
+def test_an_exception_in_the_block_still_leaves_a_complete_bag(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "run")
     writer.add_topic("/words", STRING, TopicQos())
     writer.write("/words", cdr(text("hello")), 1)
@@ -213,14 +217,14 @@ def test_an_exception_in_the_block_still_leaves_a_complete_bag(tmp_path):
 
 
 @pytest.mark.parametrize("taken", ["run", "run.partial"])
-def test_nothing_is_overwritten(tmp_path, taken):
+def test_nothing_is_overwritten(tmp_path: Path, taken: str) -> None:
     (tmp_path / taken).mkdir()
     with pytest.raises(BagError, match="not overwritten"):
         BagWriter(tmp_path / "run")
     assert [p.name for p in tmp_path.iterdir()] == [taken]
 
 
-def test_a_path_taken_during_the_run_keeps_the_partial_bag(tmp_path):
+def test_a_path_taken_during_the_run_keeps_the_partial_bag(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "run")
     (tmp_path / "run").mkdir()
     with pytest.raises(BagError, match=r"stays in .*run\.partial"):
@@ -228,14 +232,14 @@ def test_a_path_taken_during_the_run_keeps_the_partial_bag(tmp_path):
     assert (tmp_path / "run.partial" / "run_0.mcap").exists()
 
 
-def test_a_parent_that_is_a_file_is_told_in_one_line(tmp_path):
+def test_a_parent_that_is_a_file_is_told_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(BagError, match="can't write the bag: Not a directory") as caught:
         BagWriter(tmp_path / "file" / "run")
     assert "\n" not in str(caught.value)
 
 
-def test_wrong_topics_stamps_metadata_and_options_are_refused(tmp_path):
+def test_wrong_topics_stamps_metadata_and_options_are_refused(tmp_path: Path) -> None:
     with pytest.raises(BagError, match="compression can't be 'gzip'"):
         BagWriter(tmp_path / "run", compression="gzip")
     with BagWriter(tmp_path / "run") as writer:
@@ -250,7 +254,7 @@ def test_wrong_topics_stamps_metadata_and_options_are_refused(tmp_path):
             with pytest.raises(BagError, match="give stamps of 0"):
                 writer.write("/words", b"", stamp)
         with pytest.raises(BagError, match="convert seed"):
-            writer.write_metadata("robot_formation", {"seed": 3})
+            writer.write_metadata("robot_formation", {"seed": 3})  # type: ignore[dict-item]
         assert writer.message_count == 0
     with pytest.raises(BagError, match="reliability can't be 'RELIABLE'"):
         TopicQos(reliability="RELIABLE")
@@ -258,7 +262,7 @@ def test_wrong_topics_stamps_metadata_and_options_are_refused(tmp_path):
         TopicQos(depth=-1)
 
 
-def test_counts_are_kept_by_topic(tmp_path):
+def test_counts_are_kept_by_topic(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "run") as writer:
         writer.add_topic("/words", STRING, TopicQos())
         writer.add_topic("/silent", STRING, TopicQos())
@@ -266,7 +270,7 @@ def test_counts_are_kept_by_topic(tmp_path):
         assert writer.message_counts == {"/words": 1, "/silent": 0}
 
 
-def test_closed_chunks_survive_sigkill(tmp_path):
+def test_closed_chunks_survive_sigkill(tmp_path: Path) -> None:
     program = f"""
 import os, signal, sys
 sys.path[:0] = {[str(ROOT / "test" / "bag"), str(ROOT / "test" / "helpers")]!r}
@@ -284,7 +288,7 @@ os.kill(os.getpid(), signal.SIGKILL)
     assert recover(tmp_path / "run.partial", tmp_path / "saved").messages == 5
 
 
-def test_qos_text_makes_a_round_trip_and_old_numbers_are_understood():
+def test_qos_text_makes_a_round_trip_and_old_numbers_are_understood() -> None:
     profiles = (TopicQos(), TopicQos(history="keep_all", depth=0, reliability="best_effort", deadline_ns=5))
     assert parse_profiles(dump_profiles(profiles)) == profiles
     old = yaml.safe_load(dump_profiles(profiles[:1]))
@@ -298,7 +302,7 @@ def test_qos_text_makes_a_round_trip_and_old_numbers_are_understood():
 
 
 @pytest.mark.parametrize("type_name", [STRING, POSE, "nav_msgs/msg/Odometry", "visualization_msgs/msg/Marker"])
-def test_type_hashes_equal_those_of_the_ros_distribution(type_name):
+def test_type_hashes_equal_those_of_the_ros_distribution(type_name: str) -> None:
     package, _, name = type_name.split("/")
     file = Path(sysconfig.get_path("data")) / "share" / package / "msg" / f"{name}.json"
     if not file.exists():
@@ -307,8 +311,8 @@ def test_type_hashes_equal_those_of_the_ros_distribution(type_name):
     assert definition(type_name).type_hash == next(h["hash_string"] for h in hashes if h["type_name"] == type_name)
 
 
-def test_a_full_disk_is_told_in_one_line(tmp_path, monkeypatch):
-    def full():
+def test_a_full_disk_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full() -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with BagWriter(tmp_path / "run") as writer:
@@ -317,8 +321,10 @@ def test_a_full_disk_is_told_in_one_line(tmp_path, monkeypatch):
             writer.end_chunk()
 
 
-def test_a_disk_that_is_full_at_the_beginning_is_left_as_it_was(tmp_path, monkeypatch):
-    def full(*arguments, **options):
+def test_a_disk_that_is_full_at_the_beginning_is_left_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*arguments: object, **options: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr("robot_formation.bag.writer.McapFile", full)

@@ -1,10 +1,13 @@
 """The curve fit recovers what the drives were made from, and chooses the degree by the drives' scatter."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
 
 from robot_formation.calibration.motor_fit import MeasuredDrive, fit_axis
 from robot_formation.drive.curves import CalibrationError
@@ -12,7 +15,14 @@ from robot_formation.drive.curves import CalibrationError
 DISTANCES = np.array([0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16, 0.18, 0.2])
 
 
-def drives(curve, *, repeats=2, scatter=0.0, seed=0, distances=DISTANCES):
+def drives(
+    curve: Sequence[float],
+    *,
+    repeats: int = 2,
+    scatter: float = 0.0,
+    seed: int = 0,
+    distances: NDArray[np.float64] = DISTANCES,
+) -> list[MeasuredDrive]:
     """Forth and back over the rotations of a known curve; the travel scatters."""
     noise = np.random.default_rng(seed)
     rotations = Polynomial(curve)(distances)
@@ -25,7 +35,7 @@ def drives(curve, *, repeats=2, scatter=0.0, seed=0, distances=DISTANCES):
 
 
 @pytest.mark.parametrize("curve", [(-0.08, 33.0), (-0.08, 31.0, 12.0), (-0.1, 30.0, 25.0, -60.0)])
-def test_a_known_curve_is_recovered_with_its_degree(curve):
+def test_a_known_curve_is_recovered_with_its_degree(curve: Sequence[float]) -> None:
     fit = fit_axis("v", drives(curve))
     assert fit.curve == pytest.approx(curve, rel=1e-8)
     assert fit.residual_max < 1e-12
@@ -33,22 +43,22 @@ def test_a_known_curve_is_recovered_with_its_degree(curve):
 
 
 @given(constant=st.floats(-0.2, -0.01), slope=st.floats(25.0, 50.0))
-def test_any_line_is_recovered(constant, slope):
+def test_any_line_is_recovered(constant: float, slope: float) -> None:
     fit = fit_axis("v", drives((constant, slope)))
     assert fit.curve == pytest.approx((constant, slope), rel=1e-9)
 
 
-def test_scatter_alone_does_not_raise_the_degree():
+def test_scatter_alone_does_not_raise_the_degree() -> None:
     degrees = [fit_axis("v", drives((-0.08, 33.0), repeats=5, scatter=0.0015, seed=seed)).degree for seed in range(200)]
     assert degrees.count(1) >= 190  # refused at 1 %
 
 
-def test_a_bend_beyond_the_scatter_raises_the_degree():
+def test_a_bend_beyond_the_scatter_raises_the_degree() -> None:
     bent = (-0.08, 28.0, 25.0)
     assert [fit_axis("v", drives(bent, repeats=5, scatter=0.0015, seed=s)).degree for s in range(20)] == [2] * 20
 
 
-def test_residuals_scatter_and_counts_are_those_of_the_drives():
+def test_residuals_scatter_and_counts_are_those_of_the_drives() -> None:
     made = drives((-0.08, 33.0), repeats=50, scatter=0.0015)
     fit = fit_axis("v", made)
     assert fit.scatter == pytest.approx(0.0015, rel=0.05)
@@ -59,14 +69,14 @@ def test_residuals_scatter_and_counts_are_those_of_the_drives():
     assert fit.residual_rms == pytest.approx(np.sqrt(np.mean([p.residual**2 for p in fit.points])))
 
 
-def test_a_line_of_the_means_is_the_least_squares_line():
+def test_a_line_of_the_means_is_the_least_squares_line() -> None:
     fit = fit_axis("v", drives((-0.08, 33.0), scatter=0.001), degrees=(1,))
     travels, rotations = zip(*((p.travel, p.rotation_rad) for p in fit.points), strict=True)
     slope, constant = np.polyfit(travels, rotations, 1)
     assert fit.curve == pytest.approx((constant, slope))
 
 
-def test_too_few_rotations_and_drives_that_bring_nothing_are_refused():
+def test_too_few_rotations_and_drives_that_bring_nothing_are_refused() -> None:
     with pytest.raises(CalibrationError, match="too few"):
         fit_axis("v", drives((-0.08, 33.0), distances=DISTANCES[:4]))
     stuck = [MeasuredDrive(rotation, 0.01) for rotation in (1.0, 2.0, 3.0, 4.0, 5.0)]

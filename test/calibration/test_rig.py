@@ -1,6 +1,7 @@
 """Calibrations on simulated robots: what is measured is true, and a calibrated robot drives what it is told to."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,19 +22,21 @@ DRIVE = DriveParameters()
 RADIUS = DRIVE.wheel_radius_m
 
 
-def rig(surface="plane", *, seed=0, noise=0.0, size_m=1.78, **values):
+def rig(
+    surface: str = "plane", *, seed: int = 0, noise: float = 0.0, size_m: float = 1.78, **values: Any
+) -> CalibrationRig:
     return CalibrationRig(make_surface(surface, {"size_m": size_m}), parameters(**values), seed, noise)
 
 
-def mean_of_commands(robot, curves, commands=40):
+def mean_of_commands(robot: RobotOnRig, curves: CalibrationParameters, commands: int = 40) -> float:
     """Mean distance of repeated 5 cm commands, mm."""
     drive = Drive(DriveParameters(calibration=curves))
-    return np.mean([robot.move(drive, Motion(x_m=0.05))[0].distance_m for _ in range(commands)]) * 1e3
+    return float(np.mean([robot.move(drive, Motion(x_m=0.05))[0].distance_m for _ in range(commands)])) * 1e3
 
 
-def test_a_calibrated_robot_drives_5_cm_on_average_and_the_default_curve_does_not():
-    odd = {"imperfections": {"rolling_radius": 0.1}}  # one curve for all robots is visibly wrong for these
-    with RobotOnRig(rig(seed=7, size_m=40.0, **odd), "follower_1") as robot:
+def test_a_calibrated_robot_drives_5_cm_on_average_and_the_default_curve_does_not() -> None:
+    odd = {"rolling_radius": 0.1}  # one curve for all robots is visibly wrong for these
+    with RobotOnRig(rig(seed=7, size_m=40.0, imperfections=odd), "follower_1") as robot:
         fits = calibrate_robot(robot, DRIVE, 3)
         own = CalibrationParameters(**{axis: fit.curve for axis, fit in fits.items()})
         assert abs(mean_of_commands(robot, own) - 50.0) < 1.0
@@ -42,8 +45,8 @@ def test_a_calibrated_robot_drives_5_cm_on_average_and_the_default_curve_does_no
         assert abs(mean_of_commands(robot, geometry) - 50.0) > 1.0
 
 
-def test_the_curves_of_ideal_robots_are_those_of_the_configuration():
-    fits = calibrate_motors(rig(**IDEAL), ["leader", "follower_1"], DRIVE, 1)
+def test_the_curves_of_ideal_robots_are_those_of_the_configuration() -> None:
+    fits = calibrate_motors(rig(imperfections=IDEAL["imperfections"]), ["leader", "follower_1"], DRIVE, 1)
     assert {robot: list(axes) for robot, axes in fits.items()} == {
         "leader": ["v", "turn"],
         "follower_1": ["v", "u", "turn"],
@@ -56,7 +59,7 @@ def test_the_curves_of_ideal_robots_are_those_of_the_configuration():
                 assert point.travel == pytest.approx(asked, abs=2e-3)  # 2 mm; turns 2 mrad
 
 
-def test_the_same_course_gives_the_same_curves_whichever_robots_are_measured_beside():
+def test_the_same_course_gives_the_same_curves_whichever_robots_are_measured_beside() -> None:
     alone = calibrate_motors(rig(seed=7), ["follower_1"], DRIVE, 1)
     both = calibrate_motors(rig(seed=7), ["leader", "follower_1"], DRIVE, 1)
     assert alone["follower_1"] == both["follower_1"]
@@ -64,7 +67,7 @@ def test_the_same_course_gives_the_same_curves_whichever_robots_are_measured_bes
     assert other["follower_1"]["v"].curve != alone["follower_1"]["v"].curve
 
 
-def test_preset_rotations_cover_the_range_of_the_drive():
+def test_preset_rotations_cover_the_range_of_the_drive() -> None:
     assert preset_rotations("v", DRIVE)[-1] * RADIUS == pytest.approx(DRIVE.max_v_m)
     assert preset_rotations("u", DRIVE)[-1] * RADIUS == pytest.approx(DRIVE.max_u_m)
     turned = preset_rotations("turn", DRIVE)[-1] * RADIUS / DRIVE.wheel_lever_m
@@ -73,23 +76,23 @@ def test_preset_rotations_cover_the_range_of_the_drive():
 
 @pytest.mark.parametrize(("axis", "amount"), [("v", 0.1), ("u", 0.1), ("turn", 0.5)])
 @pytest.mark.parametrize("sense", [1, -1])
-def test_an_ideal_robot_goes_the_way_of_its_wheels(axis, amount, sense):
+def test_an_ideal_robot_goes_the_way_of_its_wheels(axis: str, amount: float, sense: int) -> None:
     lever = DRIVE.wheel_lever_m if axis == "turn" else 1.0
-    with RobotOnRig(rig(**IDEAL, motor={"drive_mode": "pid"}), "follower_1") as robot:
+    with RobotOnRig(rig(imperfections=IDEAL["imperfections"], motor={"drive_mode": "pid"}), "follower_1") as robot:
         seen = robot.turn_wheels(axis, sense * amount * lever / RADIUS, 4.0)
     travel = seen.turn_rad if axis == "turn" else math.copysign(seen.distance_m, sense)
     assert travel == pytest.approx(sense * amount, rel=0.02)
     assert [abs(angle) for angle in seen.wheels_rad] == pytest.approx([amount * lever / RADIUS] * 4, rel=0.01)
 
 
-def test_the_observers_error_shows_in_the_scatter():
+def test_the_observers_error_shows_in_the_scatter() -> None:
     # Each distance is the difference of two readings along the way: sqrt(2) of the error of one.
-    with RobotOnRig(rig(**IDEAL, noise=0.01), "leader") as robot:
+    with RobotOnRig(rig(imperfections=IDEAL["imperfections"], noise=0.01), "leader") as robot:
         seen = [robot.turn_wheels("v", sense * 3.0, 12.0).distance_m for _ in range(30) for sense in (1, -1)]
     assert np.std(seen) == pytest.approx(0.01 * math.sqrt(2), rel=0.25)
 
 
-def test_a_robot_that_leaves_the_plate_ends_the_measurement():
+def test_a_robot_that_leaves_the_plate_ends_the_measurement() -> None:
     with (
         RobotOnRig(rig(size_m=0.3), "leader") as robot,
         pytest.raises(CalibrationError, match="left the plate"),
@@ -97,12 +100,12 @@ def test_a_robot_that_leaves_the_plate_ends_the_measurement():
         robot.turn_wheels("v", 10.0, 4.0)
 
 
-def test_a_move_beyond_the_range_ends_the_measurement():
+def test_a_move_beyond_the_range_ends_the_measurement() -> None:
     with RobotOnRig(rig(), "leader") as robot, pytest.raises(CalibrationError, match="beyond"):
         robot.move(Drive(DRIVE), Motion(x_m=0.5))
 
 
-def test_a_drive_that_takes_too_long_ends_the_measurement():
+def test_a_drive_that_takes_too_long_ends_the_measurement() -> None:
     with (
         RobotOnRig(rig(motion_timeout_s=0.2), "leader") as robot,
         pytest.raises(CalibrationError, match="didn't finish"),
@@ -110,7 +113,7 @@ def test_a_drive_that_takes_too_long_ends_the_measurement():
         robot.turn_wheels("v", 10.0, 4.0)
 
 
-def test_the_instruments_agree_to_a_pulse_and_the_wheels_error():
+def test_the_instruments_agree_to_a_pulse_and_the_wheels_error() -> None:
     flaws = {"encoder_wheel_radius": 0.01}
     measured = measure_encoders(rig(seed=1, imperfections=flaws), "follower_1", DRIVE, 1)
     assert {drive.axis for drive in measured} == {"v", "u"}
@@ -127,7 +130,7 @@ def test_the_instruments_agree_to_a_pulse_and_the_wheels_error():
             assert drive.reference_m == pytest.approx(drive.preset_m, abs=8e-3)
 
 
-def test_drives_are_summarised_by_axis_and_preset():
+def test_drives_are_summarised_by_axis_and_preset() -> None:
     drives = [Travelled("v", 0.1, 0.1, 0.101, 0.1), Travelled("v", 0.1, 0.1, 0.103, 0.1)]
     drives.append(Travelled("u", 0.1, 0.1, 0.09, 0.1))
     rows = compare_distances(drives)

@@ -3,6 +3,7 @@
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -20,12 +21,12 @@ STRING = "std_msgs/msg/String"
 SECOND = 10**9
 
 
-def cdr(words):
+def cdr(words: str) -> bytes:
     return bytes(STORE.serialize_cdr(text(words), STRING))
 
 
 @pytest.fixture
-def bag(tmp_path):
+def bag(tmp_path: Path) -> Path:
     with BagWriter(tmp_path / "bag") as writer:
         writer.add_topic("/words", STRING, TopicQos(durability="transient_local", depth=1))
         writer.write_metadata("robot_formation", {"scenario": "two", "parameters": '{"leader": {"timesteps": 4}}'})
@@ -34,14 +35,14 @@ def bag(tmp_path):
     return tmp_path / "bag"
 
 
-def cut_off(bag):
+def cut_off(bag: Path) -> Path:
     partial = bag.with_name("cut.partial")
     partial.mkdir()
     (partial / "cut_0.mcap").write_bytes((bag / f"{bag.name}_0.mcap").read_bytes()[:-20])
     return partial
 
 
-def foreign(path, plugin):
+def foreign(path: Path, plugin: StoragePlugin) -> Path:
     """A bag as rosbag2 of another time writes it."""
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         words = writer.add_connection("/words", STRING, typestore=STORE)
@@ -52,7 +53,7 @@ def foreign(path, plugin):
     return path
 
 
-def told(capsys, *arguments, code=0):
+def told(capsys: pytest.CaptureFixture[str], *arguments: object, code: int = 0) -> str:
     """Run a verb; returns standard output, or with a code of failure the one line on standard error."""
     assert main([str(argument) for argument in arguments]) == code
     found = capsys.readouterr()
@@ -63,7 +64,7 @@ def told(capsys, *arguments, code=0):
     return line
 
 
-def test_info_tells_the_figures_of_ros2_bag_info(bag, capsys):
+def test_info_tells_the_figures_of_ros2_bag_info(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     said = told(capsys, "info", bag)
     for words in ("bag_0.mcap", "mcap, compression zstd", "jazzy", "9.000000000s", "scenario:          two"):
         assert words in said
@@ -71,7 +72,7 @@ def test_info_tells_the_figures_of_ros2_bag_info(bag, capsys):
     assert f"/words | Type: {STRING} | Count:      10 | QoS: reliable transient local" in said
 
 
-def test_info_as_json(bag, capsys):
+def test_info_as_json(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = json.loads(told(capsys, "info", bag, "--json"))
     assert (found["messages"], found["start_ns"], found["end_ns"], found["duration_s"]) == (10, 0, 9 * SECOND, 9.0)
     assert found["simulated_time"] is True
@@ -84,7 +85,9 @@ def test_info_as_json(bag, capsys):
 
 
 @pytest.mark.parametrize("dates_s", [(1_700_000_000,), ()])
-def test_dates_of_a_clock_and_an_empty_bag_are_not_called_simulated(tmp_path, capsys, dates_s):
+def test_dates_of_a_clock_and_an_empty_bag_are_not_called_simulated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], dates_s: tuple[int, ...]
+) -> None:
     with BagWriter(tmp_path / "bag") as writer:
         writer.add_topic("/words", STRING, TopicQos())
         for date_s in dates_s:
@@ -93,14 +96,16 @@ def test_dates_of_a_clock_and_an_empty_bag_are_not_called_simulated(tmp_path, ca
     assert "simulated" not in told(capsys, "info", tmp_path / "bag")
 
 
-def test_early_times_of_no_run_are_simulated_or_of_a_clock_that_was_not_set(tmp_path, capsys):
+def test_early_times_of_no_run_are_simulated_or_of_a_clock_that_was_not_set(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     bag = foreign(tmp_path / "foreign", StoragePlugin.MCAP)
     assert json.loads(told(capsys, "info", bag, "--json"))["simulated_time"] is None
     assert told(capsys, "info", bag).count("simulated time or a clock that was not set") == 2
 
 
 @pytest.mark.parametrize("plugin", list(StoragePlugin))
-def test_bags_of_another_make_are_summarised(tmp_path, capsys, plugin):
+def test_bags_of_another_make_are_summarised(tmp_path: Path, capsys: pytest.CaptureFixture[str], plugin: Any) -> None:
     bag = foreign(tmp_path / "foreign", plugin)
     found = json.loads(told(capsys, "info", bag, "--json"))
     assert found["storage"] == {StoragePlugin.MCAP: "mcap", StoragePlugin.SQLITE3: "sqlite3"}[plugin]
@@ -113,7 +118,7 @@ def test_bags_of_another_make_are_summarised(tmp_path, capsys, plugin):
         assert json.loads(told(capsys, "info", path, "--json"))["messages"] == 6
 
 
-def test_analyze_reads_a_run_in_a_bag_of_another_make(tmp_path, capsys):
+def test_analyze_reads_a_run_in_a_bag_of_another_make(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from robot_formation.bag.reader import read_bag
 
     with BagWriter(tmp_path / "ours") as writer:
@@ -133,13 +138,15 @@ def test_analyze_reads_a_run_in_a_bag_of_another_make(tmp_path, capsys):
     assert results[0] == results[1]
 
 
-def test_an_empty_bag_has_a_summary_but_cannot_be_played(tmp_path, capsys):
+def test_an_empty_bag_has_a_summary_but_cannot_be_played(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     BagWriter(tmp_path / "bag").close()
     assert json.loads(told(capsys, "info", tmp_path / "bag", "--json"))["messages"] == 0
     assert "is empty" in told(capsys, "play", tmp_path / "bag", code=2)
 
 
-def test_a_bag_that_was_cut_off_is_summarised_and_completed_under_its_name(bag, capsys):
+def test_a_bag_that_was_cut_off_is_summarised_and_completed_under_its_name(
+    bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     partial = cut_off(bag)
     assert "formation recover" in told(capsys, "info", partial)
     assert json.loads(told(capsys, "info", partial, "--json"))["closed"] is False
@@ -150,7 +157,7 @@ def test_a_bag_that_was_cut_off_is_summarised_and_completed_under_its_name(bag, 
     assert "not overwritten" in told(capsys, "recover", partial, code=2)
 
 
-def test_recover_says_what_is_missing(bag, capsys):
+def test_recover_says_what_is_missing(bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = bag / "bag_0.mcap"
     file.write_bytes(file.read_bytes()[:-1000])
     found = json.loads(told(capsys, "recover", bag, "-o", bag.with_name("saved"), "--json"))
@@ -162,7 +169,7 @@ def test_recover_says_what_is_missing(bag, capsys):
     assert bag.with_name("bag_recovered").is_dir()
 
 
-def test_a_bag_that_is_being_written_is_not_recovered(tmp_path, capsys):
+def test_a_bag_that_is_being_written_is_not_recovered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     writer = BagWriter(tmp_path / "bag")
     writer.add_topic("/words", STRING, TopicQos())
     writer.write("/words", cdr("hello"), 0)
@@ -173,7 +180,9 @@ def test_a_bag_that_is_being_written_is_not_recovered(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("verb", ["info", "recover", "play"])
-def test_a_missing_bag_and_what_is_no_bag_are_one_line(tmp_path, capsys, verb):
+def test_a_missing_bag_and_what_is_no_bag_are_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str
+) -> None:
     assert "doesn't exist" in told(capsys, verb, tmp_path / "nowhere", code=2)
     assert "is not a bag" in told(capsys, verb, tmp_path, code=2)
     (tmp_path / "file.txt").write_text("hello")
@@ -193,7 +202,9 @@ def test_a_missing_bag_and_what_is_no_bag_are_one_line(tmp_path, capsys, verb):
         (["--remap", "/words=/other"], "/from:=/to"),
     ],
 )
-def test_what_cannot_be_played_is_one_line(bag, capsys, monkeypatch, arguments, words):
+def test_what_cannot_be_played_is_one_line(
+    bag: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
+) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
     assert words in told(capsys, "play", bag, *arguments, code=2)
 
@@ -208,18 +219,22 @@ def test_what_cannot_be_played_is_one_line(bag, capsys, monkeypatch, arguments, 
         (["--all", "-o", "{bag}"], "exists already and is not overwritten"),
     ],
 )
-def test_what_cannot_be_recorded_is_one_line(bag, capsys, arguments, words):
+def test_what_cannot_be_recorded_is_one_line(
+    bag: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
     assert words in told(capsys, "record", *(argument.format(bag=bag) for argument in arguments), code=2)
 
 
 @pytest.mark.parametrize("arguments", [["--max-size", "0"], ["--max-duration", "long"], ["--compression", "gzip"]])
-def test_options_out_of_range_are_usage_errors(arguments):
+def test_options_out_of_range_are_usage_errors(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(["record", "--all", *arguments])
     assert caught.value.code == 2
 
 
 @pytest.mark.parametrize(("name", "parameters"), [("recorder", RecorderParameters), ("player", PlayerParameters)])
-def test_config_files_hold_only_known_parameters_that_differ_from_the_defaults(name, parameters):
+def test_config_files_hold_only_known_parameters_that_differ_from_the_defaults(
+    name: str, parameters: type[PlayerParameters] | type[RecorderParameters]
+) -> None:
     defaults = to_mapping(parameters())
     assert [key for key, value in node_defaults(name).items() if defaults[key] == value] == []

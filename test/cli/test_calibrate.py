@@ -1,8 +1,11 @@
 """`formation calibrate` as a person types it: files, JSON, what is refused, and a run that uses the curves."""
 
 import json
+import subprocess
+from pathlib import Path
 
 import pytest
+from _pytest.capture import CaptureResult
 from mcap.reader import make_reader
 
 from cli_tools import complaint
@@ -19,9 +22,10 @@ from robot_formation.drive.curves import load_calibration
 pytestmark = pytest.mark.slow
 
 QUICK = ("--repeats", "1")
+Measured = tuple[Path, subprocess.CompletedProcess[str]]
 
 
-def call(capsys, *arguments):
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, CaptureResult[str]]:
     code = main([str(argument) for argument in arguments])
     captured = capsys.readouterr()
     assert "Traceback" not in captured.err
@@ -29,7 +33,7 @@ def call(capsys, *arguments):
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory):
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Measured:
     """A folder with the calibration of seed 3's robots, and what the command printed."""
     folder = tmp_path_factory.mktemp("calibration")
     completed = formation("calibrate", "motors", "--seed", 3, "--out", folder, "--json", *QUICK)
@@ -37,7 +41,9 @@ def measured(tmp_path_factory):
     return folder, completed
 
 
-def test_motors_prints_json_only_and_stores_the_same_curves(measured):
+def test_motors_prints_json_only_and_stores_the_same_curves(
+    measured: Measured,
+) -> None:
     folder, completed = measured
     said = json_of(completed)
     assert (said["seed"], said["surface"], said["repeats"]) == (3, "plane", 1)
@@ -58,7 +64,7 @@ def test_motors_prints_json_only_and_stores_the_same_curves(measured):
     assert "follower_1 u: 22 drives" in completed.stderr
 
 
-def test_a_run_uses_the_stored_curves_and_says_so(measured, tmp_path):
+def test_a_run_uses_the_stored_curves_and_says_so(measured: Measured, tmp_path: Path) -> None:
     folder, _ = measured
     file = folder / "motors.yaml"
     bag = tmp_path / "bag"
@@ -67,8 +73,8 @@ def test_a_run_uses_the_stored_curves_and_says_so(measured, tmp_path):
     assert completed.returncode == 0, completed.stderr
     assert f"drive curves: {file}, measured with seed 3, surface plane" in completed.stderr
     curve = load_calibration(file).robots["leader"]["v"]
-    with (bag / "bag_0.mcap").open("rb") as file:
-        command = next(message.data for _, _, message in make_reader(file).iter_messages(["/leader/joint_commands"]))
+    with (bag / "bag_0.mcap").open("rb") as stream:
+        command = next(message.data for _, _, message in make_reader(stream).iter_messages(["/leader/joint_commands"]))
     with read_bag(bag) as opened:
         assert json.loads(opened.metadata("robot_formation")["drive_curves"])["leader"]["v"] == list(curve)
     from robot_formation import conversions
@@ -78,14 +84,16 @@ def test_a_run_uses_the_stored_curves_and_says_so(measured, tmp_path):
     assert angles == pytest.approx((expected,) * 4)
 
 
-def test_a_run_of_other_robots_refuses_the_curves(capsys, measured):
-    line = complaint(capsys, "run", "--seed", 4, "--set", f"drive.calibration_file={measured[0] / 'motors.yaml'}")
+def test_a_run_of_other_robots_refuses_the_curves(capsys: pytest.CaptureFixture[str], measured: Measured) -> None:
+    line = complaint(capsys, "run", "--seed", "4", "--set", f"drive.calibration_file={measured[0] / 'motors.yaml'}")
     assert "seed 3 instead of 4" in line
 
 
-def test_files_are_replaced_with_force_only(capsys, measured, tmp_path):
+def test_files_are_replaced_with_force_only(
+    capsys: pytest.CaptureFixture[str], measured: Measured, tmp_path: Path
+) -> None:
     before = (measured[0] / "motors.yaml").read_text()
-    line = complaint(capsys, "calibrate", "motors", "--seed", 4, "--out", measured[0], *QUICK)
+    line = complaint(capsys, "calibrate", "motors", "--seed", "4", "--out", measured[0], *QUICK)
     assert "motors.yaml exists already" in line
     assert "--force" in line
     assert (measured[0] / "motors.yaml").read_text() == before
@@ -95,7 +103,9 @@ def test_files_are_replaced_with_force_only(capsys, measured, tmp_path):
     assert (tmp_path / "motors.yaml").read_text() == before  # the same seed gives the same curves
 
 
-def test_encoders_compares_the_instruments_by_the_robots_own_curves(capsys, measured, tmp_path):
+def test_encoders_compares_the_instruments_by_the_robots_own_curves(
+    capsys: pytest.CaptureFixture[str], measured: Measured, tmp_path: Path
+) -> None:
     setting = f"drive.calibration_file={measured[0] / 'motors.yaml'}"
     options = ("--seed", 3, "--out", tmp_path, "--set", setting, *QUICK)
     code, captured = call(capsys, "calibrate", "encoders", *options, "--json")
@@ -131,7 +141,9 @@ def test_encoders_compares_the_instruments_by_the_robots_own_curves(capsys, meas
         (("wheels",), ["no 'wheels'", "motors"]),
     ],
 )
-def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(capsys, tmp_path, arguments, words):
+def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: tuple[str, ...], words: list[str]
+) -> None:
     out = ("--out", tmp_path) if len(arguments) > 1 else ()
     line = complaint(capsys, "calibrate", *arguments, *out)
     for word in words:
@@ -139,12 +151,14 @@ def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(capsys, tmp_path, arg
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_made_is_said_before_anything_is_measured(capsys, tmp_path):
+def test_a_folder_that_cannot_be_made_is_said_before_anything_is_measured(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     (tmp_path / "file").write_text("")
     assert "can't be made" in complaint(capsys, "calibrate", "motors", "--out", tmp_path / "file" / "folder")
 
 
-def test_reports_and_pictures_take_several_followers_and_bends(tmp_path):
+def test_reports_and_pictures_take_several_followers_and_bends(tmp_path: Path) -> None:
     drives = [MeasuredDrive(s * (30.0 * d + 9.0 * d * d), s * d) for d in (0.02, 0.05, 0.1, 0.15, 0.2) for s in (1, -1)]
     fit = fit_axis("v", drives)
     fits = {"leader": {"v": fit}, "follower_1": {"v": fit, "u": fit}, "follower_2": {"v": fit, "u": fit, "turn": fit}}

@@ -5,10 +5,14 @@ import csv
 import io
 import json
 import math
+from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from _pytest.capture import CaptureResult
 
 from cli_tools import complaint
 from robot_formation import conversions
@@ -34,7 +38,7 @@ FILES = {"vision.csv", "vision.json", "vision.yaml", "vision_bag"} | {
 }
 
 
-def call(capsys, *arguments):
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, CaptureResult[str]]:
     code = main(["calibrate", "vision", *map(str, arguments)])
     captured = capsys.readouterr()
     assert "Traceback" not in captured.err
@@ -42,7 +46,7 @@ def call(capsys, *arguments):
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory):
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("vision")
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
@@ -52,7 +56,7 @@ def measured(tmp_path_factory):
     return folder
 
 
-def test_the_papers_grid_is_complete_and_the_finer_sets_lie_beside_the_neighbour():
+def test_the_papers_grid_is_complete_and_the_finer_sets_lie_beside_the_neighbour() -> None:
     places = positions(0.05, 0.238)
     grid = [place for place in places if place.angles_deg == ANGLES_DEG]
     assert len(grid) * len(ANGLES_DEG) == 19 * 19 * 9
@@ -70,12 +74,12 @@ def test_the_papers_grid_is_complete_and_the_finer_sets_lie_beside_the_neighbour
 
 
 @pytest.mark.parametrize("step", [0.07, 0.0, -0.05, math.nan, math.inf, 0.001, 1.0])
-def test_a_step_that_does_not_divide_the_grid_is_refused(step):
+def test_a_step_that_does_not_divide_the_grid_is_refused(step: float) -> None:
     with pytest.raises(CalibrationError, match="whole steps"):
         positions(step, 0.238)
 
 
-def test_a_look_sees_the_face_where_the_pinhole_projects_it_and_nothing_where_robots_overlap():
+def test_a_look_sees_the_face_where_the_pinhole_projects_it_and_nothing_where_robots_overlap() -> None:
     conditions = conditions_of(override(load_track("two"), ["world.surface=plane"]))
     straight, turned = measure(Position(0.3, 0.02, (0.0, 60.0)), conditions)
     assert not turned.attainable  # the body's corner is 21.8 cm from its middle, 30 - 11.9 are free
@@ -87,7 +91,7 @@ def test_a_look_sees_the_face_where_the_pinhole_projects_it_and_nothing_where_ro
     assert straight.frames == 32  # block filtering 40 shows a block in frame 21, and the last three must agree
 
 
-def test_the_true_faces_are_those_of_the_pinhole():
+def test_the_true_faces_are_those_of_the_pinhole() -> None:
     world = conditions_of(override(load_track("two"), ["world.surface=plane"])).world
     faces = true_faces(world, CameraSample(0.3, 0.02, 0.0, True))
     columns = [157.5 + 273.7 * (x - 0.02) / 0.308 for x in (-0.03, 0.03)]
@@ -99,7 +103,7 @@ def test_the_true_faces_are_those_of_the_pinhole():
     assert 2 not in true_faces(world, CameraSample(-0.02, 0.2, 0.0, True))  # it reaches behind the lens
 
 
-def test_a_look_depends_on_seed_and_position_only():
+def test_a_look_depends_on_seed_and_position_only() -> None:
     first, second = (conditions_of(override(load_track("two"), ["world.surface=plane", f"seed={n}"])) for n in (1, 2))
     places = [Position(0.4, 0.1, (0.0, 15.0)), Position(0.45, 0.12, (0.0, 15.0))]
     forward = [measure(place, first) for place in places]
@@ -107,7 +111,9 @@ def test_a_look_depends_on_seed_and_position_only():
     assert measure(places[1], second)[0].blocks  # another seed's noise, the same scene
 
 
-def test_the_files_agree_with_each_other_and_with_the_nodes_defaults(measured, capsys):
+def test_the_files_agree_with_each_other_and_with_the_nodes_defaults(
+    measured: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert {path.name for path in measured.iterdir()} == FILES
     code, captured = call(capsys, "--seed", 3, "--out", measured, *QUICK, "--json")
     assert code == 0
@@ -134,7 +140,7 @@ def test_the_files_agree_with_each_other_and_with_the_nodes_defaults(measured, c
         assert (measured / picture).stat().st_size > 10_000
 
 
-def test_the_bag_holds_every_attainable_look_with_both_true_poses(measured):
+def test_the_bag_holds_every_attainable_look_with_both_true_poses(measured: Path) -> None:
     looked = [s for s in read_table(measured / "vision.csv") if s.attainable]
     topics = {name: f"/ground_truth/{name}/odom" for name in ("leader", "follower_1")}
     with read_bag(measured / "vision_bag") as bag:
@@ -154,11 +160,13 @@ def test_the_bag_holds_every_attainable_look_with_both_true_poses(measured):
         assert math.degrees(math.remainder(math.pi / 2 - yaw, math.tau)) == pytest.approx(sample.clockwise_deg)
 
 
-def test_a_stopped_calibration_goes_on_where_it_was_and_ends_the_same(measured, capsys, tmp_path, monkeypatch):
+def test_a_stopped_calibration_goes_on_where_it_was_and_ends_the_same(
+    measured: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = {path.name: path.read_bytes() for path in measured.iterdir() if path.is_file()}
     carry_out = camera_run.carry_out
 
-    def stopped(*arguments):
+    def stopped(*arguments: Any) -> Iterator[Any]:
         for number, found in enumerate(carry_out(*arguments)):
             if number == 5:
                 raise KeyboardInterrupt
@@ -182,8 +190,10 @@ def test_a_stopped_calibration_goes_on_where_it_was_and_ends_the_same(measured, 
         assert one.message_count == other.message_count
 
 
-def test_other_conditions_need_another_folder_or_force(measured, capsys, tmp_path):
-    line = complaint(capsys, "calibrate", "vision", "--seed", 4, "--out", measured, *QUICK)
+def test_other_conditions_need_another_folder_or_force(
+    measured: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    line = complaint(capsys, "calibrate", "vision", "--seed", "4", "--out", measured, *QUICK)
     assert "seed 3 instead of 4" in line
     assert "--force" in line
     record, table = tmp_path / "vision.json", tmp_path / "vision.csv"
@@ -194,7 +204,7 @@ def test_other_conditions_need_another_folder_or_force(measured, capsys, tmp_pat
     assert record.read_text() == "["  # nothing was replaced
 
 
-def test_a_table_keeps_whole_positions_only_and_damaged_lines_are_told(tmp_path):
+def test_a_table_keeps_whole_positions_only_and_damaged_lines_are_told(tmp_path: Path) -> None:
     places = [Position(0.3, 0.0, (0.0, 15.0)), Position(0.4, 0.0, (0.0, 15.0))]
     samples = [
         [
@@ -216,8 +226,10 @@ def test_a_table_keeps_whole_positions_only_and_damaged_lines_are_told(tmp_path)
         list(read_table(table.path))
 
 
-def test_a_dead_worker_is_told_in_a_line(capsys, tmp_path, monkeypatch):
-    def died(position, conditions):
+def test_a_dead_worker_is_told_in_a_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def died(position: object, conditions: object) -> None:
         raise BrokenExecutor
 
     monkeypatch.setattr(camera_run, "measure", died)
@@ -238,14 +250,18 @@ def test_a_dead_worker_is_told_in_a_line(capsys, tmp_path, monkeypatch):
         (("--repeats", "3"), ["--repeats"]),
     ],
 )
-def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(capsys, tmp_path, arguments, words):
+def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: tuple[str, str], words: list[str]
+) -> None:
     line = complaint(capsys, "calibrate", "vision", "--out", tmp_path / "new", *arguments)
     for word in words:
         assert word in line
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_camera_that_never_sees_the_marker_keeps_its_table_and_says_what_is_missing(capsys, tmp_path):
+def test_a_camera_that_never_sees_the_marker_keeps_its_table_and_says_what_is_missing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     for name in ("vision.csv", "vision.json", "vision.yaml"):
         (tmp_path / name).write_text("of an older calibration")
     (tmp_path / "vision_bag.partial").mkdir()
@@ -256,7 +272,7 @@ def test_a_camera_that_never_sees_the_marker_keeps_its_table_and_says_what_is_mi
     assert "vision.yaml" not in {path.name for path in tmp_path.iterdir()}
 
 
-def test_the_record_names_what_results_depend_on_and_nothing_else():
+def test_the_record_names_what_results_depend_on_and_nothing_else() -> None:
     record = camera_run.record_of(conditions_of(load_track("two")), 0.05)
     assert {"seed", "step_m", "world.surface", "world.camera.gamma", "block_detector.block_filtering"} <= set(record)
     assert not [name for name in record if name.startswith(("world.motor", "fine_tuner.alignment"))]

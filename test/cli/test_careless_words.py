@@ -66,7 +66,9 @@ LINES = {
 
 
 @pytest.mark.parametrize("line", LINES)
-def test_a_careless_line_is_answered_with_one_that_helps(capsys, monkeypatch, request, line):
+def test_a_careless_line_is_answered_with_one_that_helps(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, line: str
+) -> None:
     monkeypatch.chdir(request.config.rootpath)
     said = complaint(capsys, *shlex.split(line))
     assert LINES[line] in said

@@ -1,5 +1,9 @@
 """A slice of bench/fuzz_inputs.py: damaged and hostile input of every kind ends in a result or in one line."""
 
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
 import pytest
 
 import fuzz_cases
@@ -11,12 +15,13 @@ CASES = 200
 FIRST = 1_000_000  # others than those that the script begins with
 
 
-def options(*words):
+def options(*words: str) -> Namespace:
     # No bound on processor time: a loaded machine is not at fault.
-    return fuzz_inputs.parsed(["--jobs", "1", "--cpu-s", "1e9", "--wall-s", "300", "--keep", "", *words])
+    parsed: Namespace = fuzz_inputs.parsed(["--jobs", "1", "--cpu-s", "1e9", "--wall-s", "300", "--keep", "", *words])
+    return parsed
 
 
-def test_no_input_ends_in_a_traceback_or_takes_a_gigabyte():
+def test_no_input_ends_in_a_traceback_or_takes_a_gigabyte() -> None:
     results = fuzz_inputs.run_all(options(), range(FIRST, FIRST + CASES))
     failures = [fuzz_inputs.report(result, 0) for result in results if result["wrong"]]
     assert not failures, "\n".join(failures)
@@ -27,13 +32,13 @@ def test_no_input_ends_in_a_traceback_or_takes_a_gigabyte():
     assert lines[-1].startswith(f"| all | {CASES} |")
 
 
-def test_a_case_depends_on_seed_and_number_only(tmp_path):
+def test_a_case_depends_on_seed_and_number_only(tmp_path: Path) -> None:
     made = []
     for place in (tmp_path / "one", tmp_path / "two"):
         for number in range(60):
             folder = place / str(number)
             folder.mkdir(parents=True)
-            case = fuzz_cases.make_case(fuzz_inputs.np.random.default_rng([0, number]), number, folder)
+            case = fuzz_cases.make_case(np.random.default_rng([0, number]), number, folder)
             files = {
                 str(path.relative_to(folder)): path.read_bytes()
                 for path in sorted(folder.rglob("*"))
@@ -55,12 +60,12 @@ def test_a_case_depends_on_seed_and_number_only(tmp_path):
         (0, '{"a": NaN}', "", "standard output is no strict JSON"),
     ],
 )
-def test_the_harness_finds_what_it_is_to_find(code, out, err, wrong):
+def test_the_harness_finds_what_it_is_to_find(code: int, out: str, err: str, wrong: str) -> None:
     case = fuzz_cases.Case("bag", ["info", "bag", "--json"])
     assert fuzz_inputs.judged(case, code, out, err) == wrong
 
 
-def test_tracebacks_hangs_and_deaths_are_failures(monkeypatch, tmp_path):
+def test_tracebacks_hangs_and_deaths_are_failures(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     folder = tmp_path / "case"
     folder.mkdir()
     monkeypatch.setattr(fuzz_inputs, "perform", lambda case: 1 // 0)

@@ -7,11 +7,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from graph_tools import alive
-from robot_formation.paths import project_root
+from repository import ROOT
 
 pytestmark = pytest.mark.slow
 
@@ -31,7 +32,9 @@ sys.meta_path.insert(0, Finder())
 """
 
 
-def interrupted_at(tmp_path, module, *arguments, number="SIGINT", times=1, **options):
+def interrupted_at(
+    tmp_path: Path, module: str, *arguments: str, number: str = "SIGINT", times: int = 1, **options: Any
+) -> subprocess.CompletedProcess[str]:
     """Run a verb that gets a signal when it begins to import a module."""
     (tmp_path / "sitecustomize.py").write_text(HOOK.format(module=module, times=times, number=number))
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
@@ -41,7 +44,7 @@ def interrupted_at(tmp_path, module, *arguments, number="SIGINT", times=1, **opt
 
 @pytest.mark.parametrize(("number", "times"), [("SIGINT", 1), ("SIGINT", 2), ("SIGTERM", 1), ("SIGHUP", 1)])
 @pytest.mark.parametrize("module", ["argparse", "robot_formation.cli.sweep", "numpy", "numpy.linalg", "pybullet"])
-def test_an_interrupt_while_importing_is_one_line(tmp_path, module, number, times):
+def test_an_interrupt_while_importing_is_one_line(tmp_path: Path, module: str, number: str, times: int) -> None:
     completed = interrupted_at(tmp_path, module, *QUICK_RUN, number=number, times=times)
     assert completed.returncode == 130
     assert completed.stdout == ""
@@ -49,8 +52,8 @@ def test_an_interrupt_while_importing_is_one_line(tmp_path, module, number, time
     assert "Traceback" not in completed.stderr
 
 
-def test_under_nohup_a_closed_terminal_ends_nothing(tmp_path):
-    def ignore():
+def test_under_nohup_a_closed_terminal_ends_nothing(tmp_path: Path) -> None:
+    def ignore() -> None:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
     completed = interrupted_at(tmp_path, "numpy", *QUICK_RUN, number="SIGHUP", preexec_fn=ignore)
@@ -58,8 +61,8 @@ def test_under_nohup_a_closed_terminal_ends_nothing(tmp_path):
     assert "interrupted" not in completed.stderr
 
 
-def test_the_script_keeps_interrupts_until_they_can_be_taken(tmp_path):
-    script = project_root() / "formation"
+def test_the_script_keeps_interrupts_until_they_can_be_taken(tmp_path: Path) -> None:
+    script = ROOT / "formation"
     with subprocess.Popen([script, "doctor"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while b"python" not in _command_of(process.pid) and process.poll() is None:
             pass
@@ -68,12 +71,12 @@ def test_the_script_keeps_interrupts_until_they_can_be_taken(tmp_path):
     assert (process.returncode, errors) in ((130, "formation: interrupted\n"), (130, "formation doctor: interrupted\n"))
 
 
-def _command_of(pid):
+def _command_of(pid: int) -> bytes:
     with open(f"/proc/{pid}/cmdline", "rb") as file:
         return file.read().split(b"\0")[0]
 
 
-def test_an_interrupt_in_a_destructor_is_not_lost():
+def test_an_interrupt_in_a_destructor_is_not_lost() -> None:
     code = """
 import signal, sys
 from robot_formation.cli.interrupts import Interrupts
@@ -94,7 +97,7 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.parametrize("closed", ["1", "2", "12", "012"])
-def test_closed_streams_leave_the_exit_code_and_the_bag_alone(tmp_path, closed):
+def test_closed_streams_leave_the_exit_code_and_the_bag_alone(tmp_path: Path, closed: str) -> None:
     bag = tmp_path / "bag"
     closing = " ".join(f"{number}>&-" for number in closed)
     command = ["sh", "-c", f'exec "$@" {closing}', "sh", *PROCESS, *QUICK_RUN, "--bag", str(bag)]
@@ -105,9 +108,11 @@ def test_closed_streams_leave_the_exit_code_and_the_bag_alone(tmp_path, closed):
     assert info.returncode == 0
 
 
-def test_a_closed_pipe_does_not_change_the_exit_code_of_a_run(tmp_path):
+def test_a_closed_pipe_does_not_change_the_exit_code_of_a_run(tmp_path: Path) -> None:
     command = [*PROCESS, *QUICK_RUN, "--set", "world.camera.pan_deg=-90.0", "--bag", str(tmp_path / "bag")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
         process.stdout.close()
         errors = process.stderr.read()
     assert process.returncode == 3
@@ -115,7 +120,7 @@ def test_a_closed_pipe_does_not_change_the_exit_code_of_a_run(tmp_path):
 
 
 @pytest.mark.parametrize("arguments", [["list"], ["list", "--json"], ["--help"], ["list", "--help"], ["--version"]])
-def test_a_full_disk_is_one_line_and_exit_code_2(arguments):
+def test_a_full_disk_is_one_line_and_exit_code_2(arguments: list[str]) -> None:
     with open("/dev/full", "w") as full:
         completed = subprocess.run([*PROCESS, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert completed.returncode == 2
@@ -123,7 +128,7 @@ def test_a_full_disk_is_one_line_and_exit_code_2(arguments):
     assert len(completed.stderr.splitlines()) == 1
 
 
-def test_a_terminal_that_is_closed_ends_a_run_by_130(tmp_path):
+def test_a_terminal_that_is_closed_ends_a_run_by_130(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     pid, terminal = pty.fork()
     if pid == 0:
@@ -136,7 +141,7 @@ def test_a_terminal_that_is_closed_ends_a_run_by_130(tmp_path):
     assert (bag / "metadata.yaml").is_file()
 
 
-def test_an_interrupted_sweep_says_so_in_one_line_and_leaves_no_worker(tmp_path):
+def test_an_interrupted_sweep_says_so_in_one_line_and_leaves_no_worker(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [*PROCESS, "sweep", "--tracks", "one", "--predictors", "previous", "--seeds", "0:40", "--jobs", "2"]
     command += ["--set", "leader.timesteps=1", "--out", str(out)]

@@ -3,14 +3,16 @@
 import argparse
 
 import pytest
+from _pytest.capture import CaptureResult
 
 from robot_formation.cli.main import main
 from robot_formation.cli.parser import Names, Parser, number, whole_number
 
 
-def ended(capsys, *arguments):
+def ended(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, CaptureResult[str]]:
     with pytest.raises(SystemExit) as leave:
         main(list(arguments))
+    assert isinstance(leave.value.code, int)
     return leave.value.code, capsys.readouterr()
 
 
@@ -38,7 +40,9 @@ def ended(capsys, *arguments):
         (("run", "--real-time-factor", "nan"), "formation run", "'nan' is not a number"),
     ],
 )
-def test_what_is_misspelt_is_named_under_the_usage_of_its_own_verb(capsys, arguments, verb, words):
+def test_what_is_misspelt_is_named_under_the_usage_of_its_own_verb(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], verb: str, words: str
+) -> None:
     code, said = ended(capsys, *arguments)
     assert (code, said.out) == (2, "")
     lines = said.err.splitlines()
@@ -48,25 +52,25 @@ def test_what_is_misspelt_is_named_under_the_usage_of_its_own_verb(capsys, argum
 
 
 @pytest.mark.parametrize("arguments", [(), ("calibrate",)], ids=["formation", "formation calibrate"])
-def test_without_a_verb_the_help_is_printed(capsys, arguments):
+def test_without_a_verb_the_help_is_printed(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...]) -> None:
     code, said = ended(capsys, *arguments)
     assert (code, said.err) == (0, "")
     assert said.out.startswith(f"usage: {' '.join(['formation', *arguments])} [-h]")
 
 
-def test_help_is_given_whatever_else_is_misspelt(capsys):
+def test_help_is_given_whatever_else_is_misspelt(capsys: pytest.CaptureFixture[str]) -> None:
     code, said = ended(capsys, "run", "--sed", "3", "--help")
     assert code == 0
     assert "--seed" in said.out
 
 
-def test_a_very_long_word_is_shortened(capsys):
+def test_a_very_long_word_is_shortened(capsys: pytest.CaptureFixture[str]) -> None:
     _, said = ended(capsys, "run", "x" * 5000)
     assert len(said.err.splitlines()[-1]) < 200
 
 
 @pytest.fixture
-def parser():
+def parser() -> Parser:
     made = Parser(prog="program")
     made.add_argument("-o", "--out")
     made.add_argument("--seed", type=whole_number)
@@ -88,7 +92,7 @@ def parser():
         ["--out", "-two words"],
     ],
 )
-def test_what_argparse_takes_is_taken(parser, arguments):
+def test_what_argparse_takes_is_taken(parser: Parser, arguments: list[str]) -> None:
     plain = argparse.ArgumentParser(prog="program", parents=[parser], add_help=False, conflict_handler="resolve")
     try:
         expected = plain.parse_args(arguments)
@@ -110,12 +114,12 @@ def test_what_argparse_takes_is_taken(parser, arguments):
         (["--names", "one"], ("one",)),
     ],
 )
-def test_names_add_up_and_count_once(parser, arguments, names):
+def test_names_add_up_and_count_once(parser: Parser, arguments: list[str], names: tuple[str, ...]) -> None:
     assert parser.parse_args(arguments).names == names
 
 
 @pytest.mark.parametrize("text", ["", ",", "a,", "a,,b", " "])
-def test_empty_names_are_refused(parser, capsys, text):
+def test_empty_names_are_refused(parser: Parser, capsys: pytest.CaptureFixture[str], text: str) -> None:
     with pytest.raises(SystemExit):
         parser.parse_args(["--names", text])
     assert "takes one or several, separated by commas" in capsys.readouterr().err

@@ -3,10 +3,14 @@
 import json
 import subprocess
 import sys
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any
 
 import matplotlib.image
 import numpy as np
 import pytest
+from _pytest.capture import CaptureResult
 
 import cli_tools
 from robot_formation.analysis.displacement_log import read_log
@@ -27,7 +31,7 @@ COMMANDED = [(0.020, 0.040), (0.021, 0.041), (0.022, 0.042), (0.023, 0.043)]
 
 
 @pytest.fixture
-def log(tmp_path):
+def log(tmp_path: Path) -> Path:
     rng = np.random.default_rng(3)
     rows = np.hstack([rng.normal([0.0, 0.05], 0.003, (12, 2)), rng.normal(0.0, 0.002, (12, 2))])
     path = tmp_path / "log.csv"
@@ -36,7 +40,7 @@ def log(tmp_path):
     return path
 
 
-def write_bag(path, *, commanded=True, followers=1, unseen=()):
+def write_bag(path: Path, *, commanded: bool = True, followers: int = 1, unseen: Collection[int] = ()) -> Path:
     with BagWriter(path) as writer:
         run = SyntheticRun(writer, followers)
         if commanded:
@@ -51,21 +55,23 @@ def write_bag(path, *, commanded=True, followers=1, unseen=()):
     return path
 
 
-def predict(capsys, *arguments):
+def predict(capsys: pytest.CaptureFixture[str], *arguments: object) -> CaptureResult[str]:
     assert main(["predict", *map(str, arguments)]) == 0
     return capsys.readouterr()
 
 
-def forecasts(capsys, *arguments):
+def forecasts(capsys: pytest.CaptureFixture[str], *arguments: object) -> Any:
     said = predict(capsys, *arguments, "--json")
     return json.loads(said.out)["predictors"]
 
 
-def complaint(capsys, *arguments):
+def complaint(capsys: pytest.CaptureFixture[str], *arguments: Path | str) -> str:
     return cli_tools.complaint(capsys, "predict", *arguments)
 
 
-def test_json_holds_forecast_covariance_and_errors_of_each_predictor_and_nothing_else(capsys, log, tmp_path):
+def test_json_holds_forecast_covariance_and_errors_of_each_predictor_and_nothing_else(
+    capsys: pytest.CaptureFixture[str], log: Path, tmp_path: Path
+) -> None:
     said = predict(capsys, log, "--json")
     assert said.err == ""
     found = json.loads(said.out)
@@ -85,7 +91,9 @@ def test_json_holds_forecast_covariance_and_errors_of_each_predictor_and_nothing
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_forecast_is_that_of_a_predictor_that_saw_the_rows_before(capsys, log, name):
+def test_a_forecast_is_that_of_a_predictor_that_saw_the_rows_before(
+    capsys: pytest.CaptureFixture[str], log: Path, name: str
+) -> None:
     found = forecasts(capsys, log, "--predictor", name)[name]
     rows = read_log(log)
     predictor = Predictor(PredictorParameters(name=name))
@@ -99,18 +107,20 @@ def test_a_forecast_is_that_of_a_predictor_that_saw_the_rows_before(capsys, log,
     assert found["error_m"]["rmse"] == pytest.approx(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
 
 
-def test_predictors_come_in_the_order_named_once_each(capsys, log):
+def test_predictors_come_in_the_order_named_once_each(capsys: pytest.CaptureFixture[str], log: Path) -> None:
     options = ("--predictor", "ewma+close", "--predictor", "previous", "--predictor", "ewma+close")
     assert list(forecasts(capsys, log, *options)) == ["ewma+close", "previous"]
 
 
-def test_predictor_is_an_option_and_no_abbreviation_that_another_option_could_take(capsys, log):
+def test_predictor_is_an_option_and_no_abbreviation_that_another_option_could_take(
+    capsys: pytest.CaptureFixture[str], log: Path
+) -> None:
     assert "argument --predictor: takes one or several" in complaint(capsys, log, "--predictor", ",")
     assert list(forecasts(capsys, log, "--predictor", "ewma", "--predictors", "previous")) == ["ewma", "previous"]
 
 
 @pytest.mark.parametrize("option", ["--predictors", "--predictor"])
-def test_predictors_may_be_listed_with_commas(capsys, log, option):
+def test_predictors_may_be_listed_with_commas(capsys: pytest.CaptureFixture[str], log: Path, option: str) -> None:
     assert list(forecasts(capsys, log, option, "ewma+close,previous", option, "previous,literal")) == [
         "ewma+close",
         "previous",
@@ -118,7 +128,7 @@ def test_predictors_may_be_listed_with_commas(capsys, log, option):
     ]
 
 
-def test_parameters_are_those_of_run(capsys, log):
+def test_parameters_are_those_of_run(capsys: pytest.CaptureFixture[str], log: Path) -> None:
     plain = forecasts(capsys, log, "--predictor", "ewma")["ewma"]
     last = forecasts(capsys, log, "--predictor", "ewma", "--set", "predictor.ewma.gain=1")["ewma"]
     previous = forecasts(capsys, log, "--predictor", "previous")["previous"]
@@ -126,7 +136,7 @@ def test_parameters_are_those_of_run(capsys, log):
     assert plain["forecast"][2] != pytest.approx(previous["forecast"][2])
 
 
-def test_a_single_row_has_no_forecast_and_no_errors(capsys, tmp_path):
+def test_a_single_row_has_no_forecast_and_no_errors(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("u_m,v_m\n0.01,0.05\n")
     found = forecasts(capsys, path, "--predictor", "measured")["measured"]
@@ -136,7 +146,7 @@ def test_a_single_row_has_no_forecast_and_no_errors(capsys, tmp_path):
     assert (tmp_path / "log_forecasts.png").stat().st_size > 5000
 
 
-def test_the_table_and_a_picture_beside_the_log_are_made(capsys, log):
+def test_the_table_and_a_picture_beside_the_log_are_made(capsys: pytest.CaptureFixture[str], log: Path) -> None:
     said = predict(capsys, log)
     assert said.err == ""
     lines = said.out.splitlines()
@@ -156,7 +166,9 @@ def test_the_table_and_a_picture_beside_the_log_are_made(capsys, log):
 
 
 @pytest.mark.parametrize("names", [["previous"], ["literal", "ewma"], list(NAMES)])
-def test_a_picture_goes_where_it_is_told(capsys, log, tmp_path, names):
+def test_a_picture_goes_where_it_is_told(
+    capsys: pytest.CaptureFixture[str], log: Path, tmp_path: Path, names: list[str]
+) -> None:
     options = [word for name in names for word in ("--predictor", name)]
     for suffix in (".png", ".svg"):
         picture = tmp_path / f"picture{suffix}"
@@ -165,7 +177,7 @@ def test_a_picture_goes_where_it_is_told(capsys, log, tmp_path, names):
     assert not log.with_name("log_forecasts.png").exists()
 
 
-def test_no_figure_draws_none_and_loads_neither_matplotlib_nor_ros(log):
+def test_no_figure_draws_none_and_loads_neither_matplotlib_nor_ros(log: Path) -> None:
     program = (
         f"import sys; from robot_formation.cli.main import main; main(['predict', {str(log)!r}, '--no-figure']); "
         "print([m for m in ('matplotlib', 'rclpy', 'geometry_msgs', 'pybullet', 'rosbags') if m in sys.modules], "
@@ -176,7 +188,9 @@ def test_no_figure_draws_none_and_loads_neither_matplotlib_nor_ros(log):
     assert list(log.parent.iterdir()) == [log]
 
 
-def test_displacements_beyond_the_bounds_of_forecasts_are_warned_of(capsys, tmp_path):
+def test_displacements_beyond_the_bounds_of_forecasts_are_warned_of(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     path = tmp_path / "log.csv"
     path.write_text("u_m,v_m\n0.0,0.5\n0.0,0.5\n0.0,0.1\n")
     said = predict(capsys, path, "--json", "--predictor", "previous")
@@ -206,13 +220,15 @@ def test_displacements_beyond_the_bounds_of_forecasts_are_warned_of(capsys, tmp_
         (["--bag", "bag"], ["not allowed with"]),
     ],
 )
-def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(capsys, log, options, words):
+def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], log: Path, options: list[str], words: list[str]
+) -> None:
     line = complaint(capsys, log, *options)
     for word in words:
         assert word in line
 
 
-def test_a_bad_row_is_named_by_file_and_line(capsys, log):
+def test_a_bad_row_is_named_by_file_and_line(capsys: pytest.CaptureFixture[str], log: Path) -> None:
     log.write_text(log.read_text() + "0.01,0.05,here,0.0\n")
     line = complaint(capsys, log, "--json")
     assert f"{log}, line 14: residual_u_m is 'here'" in line
@@ -221,11 +237,11 @@ def test_a_bad_row_is_named_by_file_and_line(capsys, log):
     assert f"{log}, line 4: refused the displacement" in line
 
 
-def test_a_log_or_a_bag_is_needed(capsys):
+def test_a_log_or_a_bag_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
     assert "required" in complaint(capsys)
 
 
-def test_a_bags_log_has_its_displacements_residuals_and_commands(tmp_path):
+def test_a_bags_log_has_its_displacements_residuals_and_commands(tmp_path: Path) -> None:
     log = load_displacements(write_bag(tmp_path / "bag", unseen=[2]), "follower_1")
     np.testing.assert_array_equal(log.displacements_m, [step.moved for step in STEPS])
     np.testing.assert_array_equal(log.residuals_m, [step.residual for step in STEPS])
@@ -233,7 +249,7 @@ def test_a_bags_log_has_its_displacements_residuals_and_commands(tmp_path):
     assert log.places[0] == "timestep 1"
 
 
-def test_a_bag_forecasts_like_the_log_written_from_it(capsys, tmp_path):
+def test_a_bag_forecasts_like_the_log_written_from_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", unseen=[1])
     written = tmp_path / "written.csv"
     by_bag = forecasts(capsys, "--bag", bag, "--out", written)
@@ -241,14 +257,16 @@ def test_a_bag_forecasts_like_the_log_written_from_it(capsys, tmp_path):
     assert "exists already" in complaint(capsys, "--bag", bag, "--out", written)
 
 
-def test_a_bag_without_commands_is_read_and_its_picture_lies_with_those_of_the_analysis(capsys, tmp_path):
+def test_a_bag_without_commands_is_read_and_its_picture_lies_with_those_of_the_analysis(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     bag = write_bag(tmp_path / "bag", commanded=False)
     said = predict(capsys, "--bag", bag)
     assert "4 timesteps, without commands" in said.out
     assert (tmp_path / "bag_analysis" / "forecasts.png").stat().st_size > 5000
 
 
-def test_another_follower_and_one_that_is_not_there(capsys, tmp_path):
+def test_another_follower_and_one_that_is_not_there(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     bag = write_bag(tmp_path / "bag", followers=2)
     assert forecasts(capsys, "--bag", bag, "--robot", "follower_2", "--predictor", "previous")
     line = complaint(capsys, "--bag", bag, "--robot", "folower_2")
@@ -258,13 +276,15 @@ def test_another_follower_and_one_that_is_not_there(capsys, tmp_path):
     assert "is not a bag" in complaint(capsys, "--bag", __file__)
 
 
-def test_a_bag_without_displacements_is_said(capsys, tmp_path):
+def test_a_bag_without_displacements_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as writer:
         SyntheticRun(writer)
     assert "no displacements" in complaint(capsys, "--bag", tmp_path / "bag")
 
 
-def test_forecasts_of_a_runs_bag_are_what_its_predictor_said(capsys, tmp_path):
+def test_forecasts_of_a_runs_bag_are_what_its_predictor_said(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     bag = tmp_path / "bag"
     options = ["--in-process", "--camera", "on_demand", "--set", "leader.timesteps=5", "--predictor", "measured"]
     assert main(["run", "--seed", "3", "--bag", str(bag), "--json", *options]) == 0

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -40,7 +41,9 @@ FAST = ("--camera", "on_demand", "--in-process")
         (("analyze", __file__), ["bag"]),
     ],
 )
-def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(capsys, arguments, words):
+def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: list[str]
+) -> None:
     line = complaint(capsys, *arguments)
     for word in words:
         assert word in line
@@ -57,7 +60,9 @@ def test_a_mistake_is_one_line_with_a_hint_and_exit_code_2(capsys, arguments, wo
         ("seed: !!python/object/apply:os.system ['true']", ["YAML"]),
     ],
 )
-def test_a_bad_scenario_file_is_named(capsys, tmp_path, text, words):
+def test_a_bad_scenario_file_is_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, words: list[str]
+) -> None:
     file = tmp_path / "scenario.yaml"
     file.write_text(text)
     line = complaint(capsys, "run", "--scenario", file)
@@ -65,7 +70,7 @@ def test_a_bad_scenario_file_is_named(capsys, tmp_path, text, words):
         assert word in line
 
 
-def test_nothing_is_overwritten(capsys, tmp_path):
+def test_nothing_is_overwritten(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     bag.mkdir()
     (bag / "precious").write_text("data")
@@ -75,14 +80,16 @@ def test_nothing_is_overwritten(capsys, tmp_path):
     assert "exists already" in complaint(capsys, "run", "--bag", tmp_path / "other", "--in-process")
 
 
-def test_a_bag_that_cannot_be_written_is_said(capsys, tmp_path):
+def test_a_bag_that_cannot_be_written_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     assert "file" in complaint(capsys, "run", "--in-process", "--bag", tmp_path / "file" / "bag")
 
 
 @pytest.mark.parametrize("track", ["one", "two"])
 @pytest.mark.parametrize("predictor", ["previous", "literal", "measured"])
-def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(tmp_path, track, predictor):
+def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(
+    tmp_path: Path, track: str, predictor: str
+) -> None:
     bag = tmp_path / "bag"
     completed = formation("run", "--track", track, "--predictor", predictor, "--seed", 3, "--bag", bag, "--json", *FAST)
     assert completed.returncode in (0, 3), completed.stderr
@@ -109,7 +116,7 @@ def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(t
 
 @pytest.mark.graph
 @pytest.mark.xdist_group("cli_run")
-def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_path):
+def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_path: Path) -> None:
     from mcap.reader import make_reader
 
     bag = tmp_path / "bag"
@@ -121,6 +128,7 @@ def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_pa
     with (bag / "bag_0.mcap").open("rb") as file:
         reader = make_reader(file)
         summary = reader.get_summary()
+        assert summary is not None
         assert reader.get_header().profile == "ros2"
         assert all(schema.encoding == "ros2msg" and schema.data for schema in summary.schemas.values())
         by_mcap = sum(1 for _ in reader.iter_messages())
@@ -135,7 +143,7 @@ def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_pa
 
 @pytest.mark.graph
 @pytest.mark.xdist_group("cli_run")
-def test_images_are_recorded_on_request(tmp_path):
+def test_images_are_recorded_on_request(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     options = ("--camera", "on_demand", "--set", "leader.timesteps=1", "--images", "--json")
     assert formation("run", "--bag", bag, *options).returncode == 0
@@ -147,7 +155,7 @@ def test_images_are_recorded_on_request(tmp_path):
     assert counts["/follower_1/camera/image_raw"] == counts["/follower_1/blocks"] > 0
 
 
-def test_without_json_the_table_and_the_pictures_are_there(tmp_path):
+def test_without_json_the_table_and_the_pictures_are_there(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     completed = formation("run", "--bag", bag, "--set", "leader.timesteps=4", *FAST)
     assert completed.returncode == 0, completed.stderr
@@ -155,7 +163,7 @@ def test_without_json_the_table_and_the_pictures_are_there(tmp_path):
     assert {path.name for path in (tmp_path / "bag_analysis").iterdir()} == {"trajectory.png", "corrections.png"}
 
 
-def test_list_names_what_run_takes(capsys):
+def test_list_names_what_run_takes(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {"one", "two"} <= set(found["tracks"])
@@ -165,11 +173,13 @@ def test_list_names_what_run_takes(capsys):
     assert "measured" in capsys.readouterr().out
 
 
-def test_a_closed_pipe_is_no_error(tmp_path):
+def test_a_closed_pipe_is_no_error(tmp_path: Path) -> None:
     import subprocess
 
     command = [sys.executable, "-m", "robot_formation.cli", "list"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
         process.stdout.close()
         errors = process.stderr.read()
         process.wait()
@@ -177,8 +187,8 @@ def test_a_closed_pipe_is_no_error(tmp_path):
 
 
 def test_json_of_a_run_that_left_nothing_to_analyse_says_what_it_was_to_be_and_why_it_ended(
-    capsys, tmp_path, monkeypatch
-):
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from robot_formation.cli import run
     from robot_formation.experiment.run_result import RunResult
 
@@ -209,11 +219,13 @@ def test_json_of_a_run_that_left_nothing_to_analyse_says_what_it_was_to_be_and_w
     }
 
 
-def test_a_run_that_left_nothing_to_analyse_names_its_bag(capsys, tmp_path, monkeypatch):
+def test_a_run_that_left_nothing_to_analyse_names_its_bag(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from robot_formation.cli import run
     from robot_formation.experiment.run_result import RunResult
 
-    def refuse(args, result):
+    def refuse(args: object, result: object) -> None:
         raise BagError("no timestep")
 
     bag = tmp_path / "bag"
@@ -225,7 +237,7 @@ def test_a_run_that_left_nothing_to_analyse_names_its_bag(capsys, tmp_path, monk
     assert said.err.splitlines() == ["formation run: interrupted", "formation run: no analysis: no timestep"]
 
 
-def test_the_table_names_the_conditions_of_the_run(tmp_path, capsys):
+def test_the_table_names_the_conditions_of_the_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = tmp_path / "bag"
     options = ("--set", "leader.timesteps=1", "--set", "fine_tuner.mode=paper", "--set", "world.motor.drive_mode=pid")
     assert main(["run", "--bag", str(bag), *options, *FAST]) == 0

@@ -3,10 +3,14 @@
 import json
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import pytest
+from _pytest.capture import CaptureResult
 
 from robot_formation import paths
 from robot_formation.cli.main import main
@@ -25,11 +29,11 @@ warning: intervals say nothing with fewer than 5 seeds; 20 are --seeds 0:20
 
 
 @pytest.fixture
-def made(monkeypatch):
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Task]:
     """The tasks that were carried out, in order; runs are made up and cost nothing."""
     tasks = []
 
-    def run_task(task, settings):
+    def run_task(task: Task, settings: Sequence[str]) -> Row:
         tasks.append(task)
         correction_m = 0.3 if task.predictor == "previous" else 0.1 + 0.001 * (task.seed % 10)
         return Row(*task, "done", 15, correction_m, *[0.01] * 7)
@@ -38,12 +42,12 @@ def made(monkeypatch):
     return tasks
 
 
-def call(capsys, *arguments):
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, CaptureResult[str]]:
     code = main(["sweep", *map(str, arguments)])
     return code, capsys.readouterr()
 
 
-def complaint(capsys, *arguments):
+def complaint(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
     code, said = call(capsys, *arguments)
     assert (code, said.out) == (2, "")
     *conditions, line = said.err.strip().splitlines()
@@ -55,7 +59,9 @@ def complaint(capsys, *arguments):
 # --- output -----------------------------------------------------------------------------------------------------------
 
 
-def test_json_is_all_of_standard_output_and_progress_goes_to_standard_error(capsys, tmp_path, made):
+def test_json_is_all_of_standard_output_and_progress_goes_to_standard_error(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task]
+) -> None:
     code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
     assert code == 0
     found = json.loads(said.out)
@@ -81,7 +87,9 @@ def test_json_is_all_of_standard_output_and_progress_goes_to_standard_error(caps
     assert set(found) - set(written) == {"runs", "bag", "pictures", "reason"}
 
 
-def test_the_folder_holds_table_plan_and_both_summaries(capsys, tmp_path, made):
+def test_the_folder_holds_table_plan_and_both_summaries(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task]
+) -> None:
     code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "a" / "b")
     assert code == 0
     assert sorted(p.name for p in (tmp_path / "a" / "b").iterdir()) == [
@@ -99,7 +107,9 @@ def test_the_folder_holds_table_plan_and_both_summaries(capsys, tmp_path, made):
     assert len(made) == 6
 
 
-def test_without_out_a_new_folder_in_bags_is_made_each_time(capsys, tmp_path, made, monkeypatch):
+def test_without_out_a_new_folder_in_bags_is_made_each_time(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(paths, "default_bags_dir", lambda: tmp_path / "bags")
     monkeypatch.setattr("time.strftime", lambda form: "20260101-120000")
     for _ in range(3):
@@ -111,7 +121,9 @@ def test_without_out_a_new_folder_in_bags_is_made_each_time(capsys, tmp_path, ma
     assert len(made) == 18
 
 
-def test_a_finished_sweep_is_summarised_again_without_a_run(capsys, tmp_path, made):
+def test_a_finished_sweep_is_summarised_again_without_a_run(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task]
+) -> None:
     arguments = (*CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
     first = call(capsys, *arguments)[1].out
     made.clear()
@@ -119,14 +131,16 @@ def test_a_finished_sweep_is_summarised_again_without_a_run(capsys, tmp_path, ma
     assert (code, said.out, said.err, made) == (0, first, ANNOUNCED, [])
 
 
-def test_the_summary_is_of_what_was_asked_for_though_the_table_holds_more(capsys, tmp_path, made):
+def test_the_summary_is_of_what_was_asked_for_though_the_table_holds_more(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task]
+) -> None:
     call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out")
     fewer = [*CHOICE[:-1], "1001:1002"]
     found = json.loads(call(capsys, *fewer, "--jobs", 1, "--out", tmp_path / "out", "--json")[1].out)
     assert [entry["runs"] for entry in found["summary"]] == [1, 1]
 
 
-def test_a_real_sweep_from_the_command_to_the_numbers(capsys, tmp_path):
+def test_a_real_sweep_from_the_command_to_the_numbers(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     choice = (*CHOICE[:-1], "1000", *SHORT, "--jobs", 1, "--out", tmp_path / "out", "--json")
     code, said = call(capsys, *choice)
     assert code == 0
@@ -139,10 +153,12 @@ def test_a_real_sweep_from_the_command_to_the_numbers(capsys, tmp_path):
 # --- interruption -----------------------------------------------------------------------------------------------------
 
 
-def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(capsys, tmp_path, made, monkeypatch):
+def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = sweep.carry_out
 
-    def interrupted(tasks, settings, jobs):
+    def interrupted(tasks: Sequence[Task], settings: Sequence[str], jobs: int) -> Iterator[Row]:
         for number, row in enumerate(whole(tasks, settings, jobs)):
             if number == 4:
                 raise KeyboardInterrupt
@@ -169,10 +185,12 @@ def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(capsys, t
     assert resumed == (tmp_path / "whole" / "runs.csv").read_bytes()
 
 
-def test_a_run_that_fails_ends_the_sweep_with_one_line_and_keeps_the_others(capsys, tmp_path, made, monkeypatch):
+def test_a_run_that_fails_ends_the_sweep_with_one_line_and_keeps_the_others(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = sweep.run_task
 
-    def run_task(task, settings):
+    def run_task(task: Task, settings: Sequence[str]) -> Row:
         if len(made) == 3:
             raise sweep.SweepError("track two, seed 1001: the run stands still")
         return whole(task, settings)
@@ -194,13 +212,15 @@ def test_a_run_that_fails_ends_the_sweep_with_one_line_and_keeps_the_others(caps
         (tuple(range(0, 60, 3)), "seeds 0, 3, 6, 9, 12, 15, 18, 21, 24, ... 57 (20 seeds)"),
     ],
 )
-def test_seeds_in_words(chosen, text):
+def test_seeds_in_words(chosen: tuple[int, ...], text: str) -> None:
     assert seeds_text(chosen) == text
 
 
-def test_lists_that_are_repeated_add_up_and_names_count_once(capsys, tmp_path, made):
-    choice = ("--tracks", "two", "--tracks", "one,two", "--surfaces", "plane", "--surfaces", "bowl")
-    choice += ("--predictors", "previous", "--predictor", "ewma", "--seeds", "1:3", "--seeds", "2:4,9")
+def test_lists_that_are_repeated_add_up_and_names_count_once(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task]
+) -> None:
+    choice = ["--tracks", "two", "--tracks", "one,two", "--surfaces", "plane", "--surfaces", "bowl"]
+    choice += ["--predictors", "previous", "--predictor", "ewma", "--seeds", "1:3", "--seeds", "2:4,9"]
     assert call(capsys, *choice, "--jobs", 1, "--out", tmp_path / "out")[0] == 0
     assert {task.track for task in made} == {"one", "two"}
     assert {task.surface for task in made} == {"plane", "bowl"}
@@ -209,13 +229,15 @@ def test_lists_that_are_repeated_add_up_and_names_count_once(capsys, tmp_path, m
     assert len(made) == len(set(made)) == 2 * 2 * 2 * 4
 
 
-def test_with_five_seeds_nothing_is_warned_of(capsys, tmp_path, made):
+def test_with_five_seeds_nothing_is_warned_of(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task]
+) -> None:
     said = call(capsys, *CHOICE[:-1], "0:5", "--jobs", 1, "--out", tmp_path / "out")[1]
     assert "warning" not in said.err
     assert said.err.startswith("seeds 0 to 4 (5 seeds)\n")
 
 
-def test_progress_passes_rows_on_and_tells_the_last_always(capsys):
+def test_progress_passes_rows_on_and_tells_the_last_always(capsys: pytest.CaptureFixture[str]) -> None:
     assert list(with_progress(iter("abc"), 3)) == ["a", "b", "c"]
     lines = capsys.readouterr().err.splitlines()
     assert lines[-1].startswith("3/3 runs, ")
@@ -236,14 +258,18 @@ def test_progress_passes_rows_on_and_tells_the_last_always(capsys):
         (["--set", "predictor.forgetting=7"], ["forgetting", "outside"]),
     ],
 )
-def test_a_mistake_is_one_line_with_exit_code_2_and_makes_no_folder(capsys, tmp_path, made, options, words):
+def test_a_mistake_is_one_line_with_exit_code_2_and_makes_no_folder(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], options: list[str], words: list[str]
+) -> None:
     line = complaint(capsys, *CHOICE, "--out", tmp_path / "out", *options)
     for word in words:
         assert word in line
     assert (made, list(tmp_path.iterdir())) == ([], [])
 
 
-def test_a_folder_of_something_else_or_other_settings_and_a_file_are_refused(capsys, tmp_path, made):
+def test_a_folder_of_something_else_or_other_settings_and_a_file_are_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task]
+) -> None:
     (tmp_path / "letter.txt").write_text("dear reader")
     assert "is not empty and holds no sweep" in complaint(capsys, *CHOICE, "--out", tmp_path)
     assert "letter.txt" in complaint(capsys, *CHOICE, "--out", tmp_path / "letter.txt")
@@ -262,14 +288,14 @@ def test_a_folder_of_something_else_or_other_settings_and_a_file_are_refused(cap
     assert (tmp_path / "letter.txt").read_text() == "dear reader"
 
 
-def test_an_unknown_option_is_a_usage_error(capsys):
+def test_an_unknown_option_is_a_usage_error(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(["sweep", "--jobs", "two"])
     assert caught.value.code == 2
     assert "--jobs" in capsys.readouterr().err
 
 
-def test_a_mistake_is_found_without_loading_dask_or_matplotlib():
+def test_a_mistake_is_found_without_loading_dask_or_matplotlib() -> None:
     program = (
         "import sys; from robot_formation.cli.main import main; code = main(['sweep', '--tracks', 'tow']); "
         "print(code, [m for m in ('dask', 'distributed', 'matplotlib') if m in sys.modules])"
@@ -281,13 +307,17 @@ def test_a_mistake_is_found_without_loading_dask_or_matplotlib():
 # --- Dask -------------------------------------------------------------------------------------------------------------
 
 
-def test_dask_that_is_not_installed_is_said_with_the_command_that_installs_it(capsys, tmp_path, made, monkeypatch):
+def test_dask_that_is_not_installed_is_said_with_the_command_that_installs_it(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "dask.distributed", None)
     line = complaint(capsys, *CHOICE, "--dask", "tcp://127.0.0.1:8786", "--out", tmp_path / "out")
     assert line.endswith("--dask needs the package 'distributed'; pip install 'dask[distributed]'")
 
 
-def test_a_scheduler_that_does_not_answer_is_said(capsys, tmp_path, made, monkeypatch):
+def test_a_scheduler_that_does_not_answer_is_said(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
+) -> None:
     distributed = pytest.importorskip("dask.distributed")
     patient = distributed.Client
     monkeypatch.setattr(distributed, "Client", lambda address, timeout: patient(address, timeout="0.3s"))
@@ -297,10 +327,12 @@ def test_a_scheduler_that_does_not_answer_is_said(capsys, tmp_path, made, monkey
     assert "no Dask scheduler answers at nonsense://: " in line
 
 
-def test_a_failure_to_connect_without_words_is_said_too(capsys, tmp_path, made, monkeypatch):
+def test_a_failure_to_connect_without_words_is_said_too(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
+) -> None:
     distributed = pytest.importorskip("dask.distributed")
 
-    def fail(address, timeout):
+    def fail(address: str, timeout: float) -> None:
         raise TimeoutError
 
     monkeypatch.setattr(distributed, "Client", fail)
@@ -309,14 +341,14 @@ def test_a_failure_to_connect_without_words_is_said_too(capsys, tmp_path, made, 
 
 
 @pytest.fixture(scope="module")
-def cluster():
+def cluster() -> Iterator[str]:
     distributed = pytest.importorskip("dask.distributed")
     options = {"processes": False, "n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
     with distributed.LocalCluster(**options) as found:
         yield found.scheduler_address
 
 
-def test_a_dask_cluster_yields_the_same_table_as_this_machine(cluster):
+def test_a_dask_cluster_yields_the_same_table_as_this_machine(cluster: str) -> None:
     tasks = [Task("two", "plane", "formation", seed) for seed in (1000, 1001)]
     settings = ("leader.timesteps=4",)
     there = {row.task: repr(row) for row in sweep.carry_out_by_dask(tasks, settings, cluster)}
@@ -324,11 +356,12 @@ def test_a_dask_cluster_yields_the_same_table_as_this_machine(cluster):
     assert there == here
 
 
-def test_a_run_that_fails_on_a_dask_cluster_is_named(cluster, monkeypatch):
+def test_a_run_that_fails_on_a_dask_cluster_is_named(cluster: str, monkeypatch: pytest.MonkeyPatch) -> None:
     task = Task("two", "plane", "previous", 1000)
     stuck = ("leader.timesteps=4", "world.lockstep=[leader,follower_1]")
     with pytest.raises(sweep.SweepError, match=r"seed 1000: .*everybody waits"):
         list(sweep.carry_out_by_dask([task], stuck, cluster))
-    monkeypatch.setattr(sweep, "run_task", partial(replace, 5))  # nothing that a worker could do
+    impossible: Any = partial(replace, 5)  # type: ignore[type-var]  # nothing that a worker could do
+    monkeypatch.setattr(sweep, "run_task", impossible)
     with pytest.raises(sweep.SweepError, match=r"a Dask worker can't do the runs: TypeError: .*goes on"):
         list(sweep.carry_out_by_dask([task], (), cluster))

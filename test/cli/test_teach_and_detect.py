@@ -2,11 +2,13 @@
 
 import argparse
 import json
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 import yaml
+from numpy.typing import NDArray
 
 from robot_formation.cli import detect, teach
 from robot_formation.errors import FormationError
@@ -21,29 +23,32 @@ from tag_helpers import needs_tags
 from vision_helpers import DATA, EXAMPLES, GROUPS, PARAMETERS, canvas, picture
 
 
-def formation(*words):
+def formation(*words: object) -> int:
     parser = argparse.ArgumentParser()
     subparsers = parser.add_subparsers()
     for verb in (teach, detect):
         verb.add_parser(subparsers)
     args = parser.parse_args([str(word) for word in words])
-    return args.run(args)
+    code: int = args.run(args)
+    return code
 
 
-def write_png(path, image):
+def write_png(path: Path, image: NDArray[np.uint8]) -> Path:
     cv2.imwrite(str(path), image[:, :, ::-1])
     return path
 
 
 @pytest.fixture
-def files(tmp_path):
+def files(tmp_path: Path) -> Path:
     """Signatures, parameters and the pictures of one single example and one sequence, as files."""
     save_signatures(tmp_path / "signatures.yaml", GROUPS["G1"])
     (tmp_path / "paper.json").write_text(json.dumps(to_mapping(PARAMETERS["paper"])))
     return tmp_path
 
 
-def test_teach_prints_the_stored_bounds_and_keeps_the_other_signatures(files, capsys):
+def test_teach_prints_the_stored_bounds_and_keeps_the_other_signatures(
+    files: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     example = next(e for e in EXAMPLES["teach"] if e["group"] == "G2" and e["kind"] == "region")
     out = files / "signatures.yaml"
     region = ",".join(map(str, example["region"]))
@@ -56,7 +61,7 @@ def test_teach_prints_the_stored_bounds_and_keeps_the_other_signatures(files, ca
     assert stored[1:] == GROUPS["G1"][1:]
 
 
-def test_teach_from_a_point_uses_the_teach_threshold(files, capsys):
+def test_teach_from_a_point_uses_the_teach_threshold(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     example = next(e for e in EXAMPLES["teach"] if e["kind"] == "point" and e["grow_dist"] == 5600)
     point = ",".join(map(str, example["point"]))
     words = ("teach", DATA / example["image"], "--point", point, "--signature", example["sig"])
@@ -64,7 +69,7 @@ def test_teach_from_a_point_uses_the_teach_threshold(files, capsys):
     assert json.loads(capsys.readouterr().out)["signatures"] == [example["result"]]
 
 
-def test_teach_refuses_a_file_that_holds_no_signatures(files):
+def test_teach_refuses_a_file_that_holds_no_signatures(files: Path) -> None:
     other = files / "notes.yaml"
     other.write_text("shopping: [milk]\n")
     with pytest.raises(FormationError, match="holds no signatures"):
@@ -72,7 +77,7 @@ def test_teach_refuses_a_file_that_holds_no_signatures(files):
     assert other.read_text() == "shopping: [milk]\n"
 
 
-def test_detect_answers_single_pictures_in_the_order_given(files, capsys):
+def test_detect_answers_single_pictures_in_the_order_given(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     examples = [e for e in EXAMPLES["images"] if e["group"] == "G1"][::-1]
     paths = [write_png(files / f"{n}.png", picture(e["image"])) for n, e in enumerate(examples)]
     words = ("--signatures", files / "signatures.yaml", "--parameters", files / "paper.json", "--json")
@@ -84,7 +89,7 @@ def test_detect_answers_single_pictures_in_the_order_given(files, capsys):
     assert json.loads(capsys.readouterr().out) == expected
 
 
-def test_detect_tracks_a_sequence(files, capsys):
+def test_detect_tracks_a_sequence(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     frames = EXAMPLES["sequences"][0]["frames"][:23]
     paths = [write_png(files / f"{n}.png", picture(frame["image"])) for n, frame in enumerate(frames)]
     words = ("--signatures", files / "signatures.yaml", "--parameters", files / "paper.json", "--json")
@@ -93,15 +98,17 @@ def test_detect_tracks_a_sequence(files, capsys):
     assert answered == [frame["expected"] for frame in frames]
 
 
-def test_detect_prints_lines_and_draws(files, capsys):
+def test_detect_prints_lines_and_draws(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_png(files / "some.png", picture("seqA_20.webp"))
     words = ("--signatures", files / "signatures.yaml", "--parameters", files / "paper.json")
     assert formation("detect", path, *words, "--draw", files / "drawn") == 0
     assert "some.png: 3 blocks\n  signature 3  x 114" in capsys.readouterr().out
-    assert cv2.imread(str(files / "drawn" / "0001_some.png")).shape == (624, 948, 3)
+    drawn = cv2.imread(str(files / "drawn" / "0001_some.png"))
+    assert drawn is not None
+    assert drawn.shape == (624, 948, 3)
 
 
-def test_an_image_of_another_size_is_scaled_and_that_is_said(files, capsys):
+def test_an_image_of_another_size_is_scaled_and_that_is_said(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_png(files / "large.png", np.repeat(np.repeat(picture("seqA_20.webp"), 2, axis=0), 2, axis=1))
     words = ("--signatures", files / "signatures.yaml", "--parameters", files / "paper.json", "--json")
     assert formation("detect", path, *words) == 0
@@ -113,7 +120,7 @@ def test_an_image_of_another_size_is_scaled_and_that_is_said(files, capsys):
 @pytest.mark.parametrize(
     ("content", "message"), [(None, "can't be read"), (b"", "no image"), (b"\x89PNG\r\n\x1a\nxx", "no image")]
 )
-def test_a_missing_or_broken_image_is_refused_in_one_line(files, content, message):
+def test_a_missing_or_broken_image_is_refused_in_one_line(files: Path, content: bytes | None, message: str) -> None:
     path = files / "broken.png"
     if content is not None:
         path.write_bytes(content)
@@ -124,8 +131,8 @@ def test_a_missing_or_broken_image_is_refused_in_one_line(files, content, messag
 
 @pytest.mark.parametrize("extension", [".png", ".jpg", ".webp", ".bmp", ".tiff"])
 def test_damaged_images_are_read_or_refused_with_a_line_of_ours_and_nothing_of_the_image_libraries(
-    files, capfd, extension
-):
+    files: Path, capfd: pytest.CaptureFixture[str], extension: str
+) -> None:
     encoded = cv2.imencode(extension, picture("seqA_20.webp"))[1].ravel()
     signatures = files / "signatures.yaml"
     refused, damaged = [], 0
@@ -168,9 +175,11 @@ PIXYMON = {
 }
 
 
-def test_all_parameters_are_known_by_their_pixymon_names_and_those_of_the_camera_are_said_to_have_no_effect(tmp_path):
+def test_all_parameters_are_known_by_their_pixymon_names_and_those_of_the_camera_are_said_to_have_no_effect(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "pixymon.json").write_text(json.dumps(PIXYMON))
-    said = []
+    said: list[str] = []
     read = read_parameters(tmp_path / "pixymon.json", said.append)
     assert read == DetectorParameters(
         signature_range=(5.0, 3.5, 6.0, 3.5, 3.5, 3.5, 3.5),
@@ -190,11 +199,11 @@ def test_all_parameters_are_known_by_their_pixymon_names_and_those_of_the_camera
     assert "no effect on a picture that is taken already" in line
 
 
-def test_the_cameras_parameters_are_those_of_the_worlds_camera():
+def test_the_cameras_parameters_are_those_of_the_worlds_camera() -> None:
     assert set(specs(CameraParameters)) >= CAMERA_PARAMETERS
 
 
-def test_every_pixymon_name_begins_a_parameters_description():
+def test_every_pixymon_name_begins_a_parameters_description() -> None:
     known = {**specs(DetectorParameters), **{name: specs(CameraParameters)[name] for name in CAMERA_PARAMETERS}}
     described = {spec.description.split(":")[0] for spec in known.values()}
     assert described == {"Signature 1 range to Signature 7 range", *PIXYMON} - {
@@ -203,7 +212,7 @@ def test_every_pixymon_name_begins_a_parameters_description():
     }
 
 
-def test_one_file_of_parameters_serves_teach_and_detect(files, capsys):
+def test_one_file_of_parameters_serves_teach_and_detect(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (files / "pixymon.yaml").write_text(yaml.safe_dump(PIXYMON))
     words = ("--parameters", files / "pixymon.yaml", "--json")
     image = DATA / "G1_teach_region.webp"
@@ -232,7 +241,7 @@ def test_one_file_of_parameters_serves_teach_and_detect(files, capsys):
         ("a: [", "no valid YAML"),
     ],
 )
-def test_wrong_parameters_are_refused(files, text, message):
+def test_wrong_parameters_are_refused(files: Path, text: str, message: str) -> None:
     (files / "bad.yaml").write_text(text)
     write_png(files / "any.png", canvas())
     words = ("--signatures", files / "signatures.yaml", "--parameters", files / "bad.yaml")
@@ -251,14 +260,16 @@ def test_wrong_parameters_are_refused(files, text, message):
         ("detect", "a.png", "--signatures", "s.yaml", "--sequence", "--dt-us", "0"),
     ],
 )
-def test_wrong_usage_ends_with_exit_code_2(words, capsys):
+def test_wrong_usage_ends_with_exit_code_2(words: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         formation(*words)
     assert ended.value.code == 2
 
 
 @needs_tags
-def test_detect_finds_the_faces_of_a_marker_of_tags_without_signatures(files, capsys):
+def test_detect_finds_the_faces_of_a_marker_of_tags_without_signatures(
+    files: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     world = WorldParameters(marker=MarkerParameters(kind=MarkerKind.TAGS))
     images = [write_png(files / f"{face}.png", marker_picture(world, face)) for face in ("target", "front", "rear")]
     assert formation("detect", *images, "--sensor", "tags", "--json") == 0
@@ -267,6 +278,6 @@ def test_detect_finds_the_faces_of_a_marker_of_tags_without_signatures(files, ca
     assert all(blocks[0]["width"] == pytest.approx(50, abs=2) for blocks in found)
 
 
-def test_detect_asks_for_signatures_if_colours_are_looked_for(files):
+def test_detect_asks_for_signatures_if_colours_are_looked_for(files: Path) -> None:
     with pytest.raises(FormationError, match="--signatures FILE"):
         formation("detect", write_png(files / "red.png", canvas()))

@@ -1,10 +1,12 @@
 """The fine-tuner on messages: its neighbour's tick in, moves, frame requests, reports and its own tick out."""
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import pytest
 
-from component_helpers import wired
+from component_helpers import Wire, wired
 from robot_formation import conversions, exit_codes
 from robot_formation.alignment.paper_rules import FRONT, TARGET, AlignmentParameters, PaperAlignment
 from robot_formation.geometry.se2 import Motion
@@ -16,29 +18,29 @@ LOOK = {"frames": 1, "stable_frames": 1}
 NEIGHBOUR, OWN = "/formation/leader/done", "/formation/follower_1/done"
 
 
-def tick(number):
+def tick(number: int) -> Any:
     return conversions.uint32(number)
 
 
-def blocks(found, stamp_ns):
+def blocks(found: Sequence[Block], stamp_ns: int) -> Any:
     return conversions.blocks(found, CAMERA, stamp_ns)
 
 
-def planar(motion, stamp_ns):
+def planar(motion: Motion, stamp_ns: int) -> Any:
     return conversions.displacement(motion, BASE, stamp_ns)
 
 
 @pytest.fixture
-def wire():
+def wire() -> Wire:
     return wired("fine_tuner", "follower_1", mode="paper", look=LOOK)
 
 
-def plain(sent):
+def plain(sent: Sequence[tuple[str, Any]]) -> list[tuple[str, Any]]:
     """Topics with the data of plain messages."""
     return [(topic, getattr(message, "data", None)) for topic, message in sent]
 
 
-def begin(wire):
+def begin(wire: Wire) -> None:
     """Go through timestep 0 and the first move."""
     wire.give(NEIGHBOUR, tick(0))
     wire.give("blocks", blocks(IN_PLACE, 10))
@@ -46,7 +48,7 @@ def begin(wire):
     wire.give("moved", planar(Motion(0.049, -0.002), 20))
 
 
-def test_timesteps_0_and_1_on_messages(wire):
+def test_timesteps_0_and_1_on_messages(wire: Wire) -> None:
     assert plain(wire.give(NEIGHBOUR, tick(0))) == [("alignment", "align"), ("camera/request", 1)]
     assert plain(wire.give("blocks", blocks(IN_PLACE, 10))) == [("alignment", "aligned"), (OWN, 0)]
     (state, (topic, message)) = wire.give(NEIGHBOUR, tick(1))
@@ -71,7 +73,7 @@ def test_timesteps_0_and_1_on_messages(wire):
     assert wire.warnings == []
 
 
-def test_a_report_without_the_target_face_says_that_the_residual_is_no_estimate():
+def test_a_report_without_the_target_face_says_that_the_residual_is_no_estimate() -> None:
     wire = wired("fine_tuner", "follower_1", mode="paper", look=LOOK, alignment={"max_moves": 1})
     begin(wire)
     front = [Block(FRONT, 158, 60, 40, 40)]
@@ -82,7 +84,7 @@ def test_a_report_without_the_target_face_says_that_the_residual_is_no_estimate(
     assert conversions.has_estimate(sent["displacement"])
 
 
-def test_the_second_follower_listens_to_the_first_and_not_to_the_leader():
+def test_the_second_follower_listens_to_the_first_and_not_to_the_leader() -> None:
     wire = wired("fine_tuner", "follower_2", done_listeners=0)
     assert OWN in wire.inputs
     assert NEIGHBOUR not in wire.inputs
@@ -90,12 +92,12 @@ def test_the_second_follower_listens_to_the_first_and_not_to_the_leader():
     assert done.listeners == ()
 
 
-def cut_off(message):
+def cut_off(message: Any) -> Any:
     message.data = message.data[:-1]
     return message
 
 
-def test_bad_blocks_warn_and_do_not_count_as_a_frame(wire):
+def test_bad_blocks_warn_and_do_not_count_as_a_frame(wire: Wire) -> None:
     begin(wire)
     bad = cut_off(blocks(IN_PLACE, 30))
     assert wire.give("blocks", bad) == []
@@ -104,7 +106,7 @@ def test_bad_blocks_warn_and_do_not_count_as_a_frame(wire):
     assert len(wire.give("blocks", blocks(IN_PLACE, 31))) == 4
 
 
-def test_a_moved_that_is_not_finite_warns_and_stays_out_of_the_displacement(wire):
+def test_a_moved_that_is_not_finite_warns_and_stays_out_of_the_displacement(wire: Wire) -> None:
     wire.give(NEIGHBOUR, tick(0))
     wire.give("blocks", blocks(IN_PLACE, 10))
     wire.give(NEIGHBOUR, tick(1))
@@ -118,13 +120,13 @@ def test_a_moved_that_is_not_finite_warns_and_stays_out_of_the_displacement(wire
 @pytest.mark.parametrize(
     ("topic", "message"), [("moved", planar(Motion(0.1), 5)), ("prediction", planar(Motion(0.1), 5))]
 )
-def test_answers_that_nobody_asked_for_warn_and_change_nothing(wire, topic, message):
+def test_answers_that_nobody_asked_for_warn_and_change_nothing(wire: Wire, topic: str, message: Any) -> None:
     assert wire.give(topic, message) == []
     assert "nobody asked for" in wire.warnings[0]
     assert wire.component.details() == {"timestep": "0", "waiting for": "neighbour"}
 
 
-def test_a_lost_leader_ends_the_run_with_the_exit_code_for_it():
+def test_a_lost_leader_ends_the_run_with_the_exit_code_for_it() -> None:
     wire = wired("fine_tuner", "follower_1", mode="paper", look=LOOK, alignment={"max_empty_looks": 1})
     wire.give(NEIGHBOUR, tick(0))
     assert plain(wire.give("blocks", blocks([], 10))) == [("alignment", "lost")]

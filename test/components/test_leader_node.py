@@ -1,5 +1,7 @@
 """The leader on messages: bare ticks in and out, a straight step in between."""
 
+from typing import Any
+
 from component_helpers import wired
 from robot_formation import conversions
 from robot_formation.geometry.se2 import Motion
@@ -7,15 +9,15 @@ from robot_formation.geometry.se2 import Motion
 DONE = "/formation/leader/done"
 
 
-def tick(number):
+def tick(number: int) -> Any:
     return conversions.uint32(number)
 
 
-def moved(stamp_ns):
+def moved(stamp_ns: int) -> Any:
     return conversions.displacement(Motion(0.05), "leader/base_link", stamp_ns)
 
 
-def test_a_tour_on_messages():
+def test_a_tour_on_messages() -> None:
     wire = wired("leader", "leader", timesteps=2, step_m=0.04)
     wire.component.start()
     assert [(topic, message.data) for topic, message in wire.sent] == [(DONE, 0)]
@@ -27,12 +29,13 @@ def test_a_tour_on_messages():
         ((topic, message),) = wire.give("moved", moved(timestep * 100))
         assert (topic, message.data) == (DONE, timestep)
         assert wire.component.stamp_ns == timestep * 100
-    assert wire.component.exit_code is None
+    before = wire.component.exit_code
+    assert before is None
     assert wire.give("/formation/follower_1/done", tick(2)) == []
     assert (wire.component.exit_code, wire.component.exit_reason) == (0, "all 2 timesteps driven")
 
 
-def test_every_follower_is_waited_for():
+def test_every_follower_is_waited_for() -> None:
     wire = wired("leader", "leader", followers=["follower_1", "follower_2"])
     wire.component.start()
     assert wire.give("/formation/follower_2/done", tick(0)) == []
@@ -40,7 +43,7 @@ def test_every_follower_is_waited_for():
     assert [topic for topic, _ in wire.give("/formation/follower_1/done", tick(0))] == ["move"]
 
 
-def test_stop_lets_the_step_end_and_start_goes_on():
+def test_stop_lets_the_step_end_and_start_goes_on() -> None:
     wire = wired("leader", "leader", timesteps=5)
     services = wire.component.services()
     wire.component.start()
@@ -52,7 +55,7 @@ def test_stop_lets_the_step_end_and_start_goes_on():
     assert wire.sent[-1][0] == "move"
 
 
-def test_a_moved_that_nobody_asked_for_sends_no_tick():
+def test_a_moved_that_nobody_asked_for_sends_no_tick() -> None:
     wire = wired("leader", "leader")
     wire.component.start()
     assert wire.give("moved", moved(5)) == []

@@ -8,7 +8,7 @@ from robot_formation.errors import FormationError
 from robot_formation.parameters import from_mapping
 
 
-def test_parameters_are_taken_while_it_runs_and_a_surface_that_cannot_be_is_refused():
+def test_parameters_are_taken_while_it_runs_and_a_surface_that_cannot_be_is_refused() -> None:
     component = wired("overhead_tracker").component
     kind = KINDS["overhead_tracker"].parameter_class()
     component.set_parameters(from_mapping(kind, {"surface": "plane", "gate_m": 0.1}, where="test"))

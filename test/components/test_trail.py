@@ -10,9 +10,14 @@ from robot_formation.components.trail import MOST_POSES, SPACING_M, Trail
 STEP_M = 0.05
 
 
-def drive(steps, rests=5):
+Point = tuple[float, float, float]
+
+
+def drive(steps: int, rests: int = 5) -> tuple[list[list[Point]], list[Point]]:
     """Poses of a robot on a circle that corrects each step by some millimetres; the sizes of the paths sent."""
-    trail, sent, places = Trail(), [], []
+    trail: Trail[Point] = Trail()
+    sent: list[list[Point]] = []
+    places: list[Point] = []
     for step in range(steps):
         for rest in range(rests):
             angle = (step * STEP_M + rest * 0.002) / 1.0
@@ -23,21 +28,21 @@ def drive(steps, rests=5):
     return sent, places
 
 
-def test_what_is_sent_per_timestep_does_not_grow():
-    def poses(steps):
+def test_what_is_sent_per_timestep_does_not_grow() -> None:
+    def poses(steps: int) -> float:
         return sum(map(len, drive(steps)[0])) / steps
 
     assert poses(100) < 45
     assert max(poses(steps) for steps in (200, 400, 1000, 4000, 20_000)) < 45
 
 
-def test_a_short_drive_is_sent_pose_by_pose():
+def test_a_short_drive_is_sent_pose_by_pose() -> None:
     sent, places = drive(30, rests=1)
     assert sent == [places[: n + 1] for n in range(30)]
 
 
 @pytest.mark.parametrize("steps", [30, 400, 4000])
-def test_the_whole_drive_stays_visible(steps):
+def test_the_whole_drive_stays_visible(steps: int) -> None:
     sent, places = drive(steps)
     assert all(len(path) <= MOST_POSES for path in sent)
     last = sent[-1]
@@ -49,7 +54,7 @@ def test_the_whole_drive_stays_visible(steps):
     assert behind <= 5 * steps / 25 + 5
 
 
-def test_a_robot_that_turns_on_the_spot_sends_nothing():
-    trail = Trail()
+def test_a_robot_that_turns_on_the_spot_sends_nothing() -> None:
+    trail: Trail[str] = Trail()
     assert trail.add((1.0, 2.0, 0.0), "a") == ["a"]
     assert trail.add((1.0, 2.0, 0.0), "b") is None

@@ -1,33 +1,41 @@
 """The world on messages: it moves what it is told to, shows what it is asked for, and refuses what cannot be meant."""
 
 import math
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
-from component_helpers import wired
+from component_helpers import Wire, wired
 from robot_formation import conversions
-from robot_formation.components.world import surface_mesh
+from robot_formation.components.world import WorldComponent, surface_mesh
 from robot_formation.drive.movement_system import WHEELS, WheelCommand
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import make_surface, surface_from_texts
+from robot_formation.world import World
 
 COMMANDS, REQUEST, IMAGE = "follower_1/joint_commands", "follower_1/camera/request", "follower_1/camera/image_raw"
 
 
+def world_of(wire: Wire) -> World:
+    assert isinstance(wire.component, WorldComponent)
+    return wire.component._world
+
+
 @pytest.fixture
-def wire():
+def wire() -> Iterator[Wire]:
     found = wired("world", "", surface="plane", camera={"mode": "on_demand"}, seed=3)
     found.component.start()
     yield found
-    found.component._world.close()
+    world_of(found).close()
 
 
-def command(angles=(1.0,) * 4, limits=(4.0,) * 4):
+def command(angles: tuple[float, ...] = (1.0,) * 4, limits: tuple[float, ...] = (4.0,) * 4) -> Any:
     return conversions.joint_command(WheelCommand(angles, limits), 0)
 
 
-def run(wire):
+def run(wire: Wire) -> list[tuple[str, Any]]:
     """Let the world do all it owes; what it sends."""
     before = len(wire.sent)
     while wire.component.busy:
@@ -35,11 +43,11 @@ def run(wire):
     return wire.sent[before:]
 
 
-def of(sent, topic):
+def of(sent: Sequence[tuple[str, Any]], topic: str) -> list[Any]:
     return [message for name, message in sent if name == topic]
 
 
-def test_the_start_shows_the_ground_the_cameras_the_clock_and_every_robot(wire):
+def test_the_start_shows_the_ground_the_cameras_the_clock_and_every_robot(wire: Wire) -> None:
     topics = [topic for topic, _ in wire.sent]
     assert topics[:2] == ["surface", "follower_1/camera/camera_info"]
     assert {"clock", "leader/robot_description", "follower_1/robot_description"} <= set(topics)
@@ -51,7 +59,7 @@ def test_the_start_shows_the_ground_the_cameras_the_clock_and_every_robot(wire):
     assert not wire.component.busy
 
 
-def test_a_command_moves_the_robot_until_it_rests_and_the_last_joint_states_say_so(wire):
+def test_a_command_moves_the_robot_until_it_rests_and_the_last_joint_states_say_so(wire: Wire) -> None:
     assert wire.give(COMMANDS, command()) == []
     assert wire.component.busy
     sent = run(wire)
@@ -67,7 +75,7 @@ def test_a_command_moves_the_robot_until_it_rests_and_the_last_joint_states_say_
     assert wire.warnings == []
 
 
-def test_the_ground_truth_is_in_the_world_with_velocities_in_the_robots_frame(wire):
+def test_the_ground_truth_is_in_the_world_with_velocities_in_the_robots_frame(wire: Wire) -> None:
     wire.give(COMMANDS, command((3.0,) * 4))
     odometry = of(run(wire), "ground_truth/follower_1/odom")
     driving = odometry[len(odometry) // 2]
@@ -78,13 +86,13 @@ def test_the_ground_truth_is_in_the_world_with_velocities_in_the_robots_frame(wi
     assert odometry[-1].pose.pose.position.y > odometry[0].pose.pose.position.y + 0.02
 
 
-def nan_at(place, what):
+def nan_at(place: int, what: str) -> Any:
     values = [1.0] * 4
     values[place] = math.nan
     return command(**{what: tuple(values)})
 
 
-def named(names):
+def named(names: Sequence[str]) -> Any:
     message = command()
     message.name = list(names)
     return message
@@ -119,8 +127,8 @@ def named(names):
         "no names",
     ],
 )
-def test_a_bad_command_warns_moves_nothing_and_is_answered(wire, bad):
-    before = wire.component._world.ground_truth("follower_1")
+def test_a_bad_command_warns_moves_nothing_and_is_answered(wire: Wire, bad: Any) -> None:
+    before = world_of(wire).ground_truth("follower_1")
     assert wire.give(COMMANDS, bad) == []
     (answer,) = of(run(wire), "follower_1/joint_states")
     positions, velocities = conversions.read_joint_states(answer)
@@ -129,11 +137,11 @@ def test_a_bad_command_warns_moves_nothing_and_is_answered(wire, bad):
     (text,) = wire.warnings
     assert text.startswith("follower_1: ")
     assert text.endswith("; nothing moves")
-    assert wire.component._world.ground_truth("follower_1") == before
+    assert world_of(wire).ground_truth("follower_1") == before
     assert wire.component.health().level == 1
 
 
-def test_a_bad_command_does_not_disturb_a_motion_under_way(wire):
+def test_a_bad_command_does_not_disturb_a_motion_under_way(wire: Wire) -> None:
     other = wired("world", "", surface="plane", camera={"mode": "on_demand"}, seed=3)
     other.component.start()
     for either in (wire, other):
@@ -142,10 +150,10 @@ def test_a_bad_command_does_not_disturb_a_motion_under_way(wire):
     wire.give(COMMANDS, nan_at(1, "angles"))
     ends = [of(run(either), "follower_1/joint_states")[-1].position for either in (wire, other)]
     assert ends[0] == ends[1]
-    other.component._world.close()
+    world_of(other).close()
 
 
-def test_as_many_frames_come_as_were_asked_for_each_later_than_the_one_before(wire):
+def test_as_many_frames_come_as_were_asked_for_each_later_than_the_one_before(wire: Wire) -> None:
     wire.give(REQUEST, conversions.uint32(3))
     pictures = of(run(wire), IMAGE)
     assert len(pictures) == 3
@@ -157,45 +165,45 @@ def test_as_many_frames_come_as_were_asked_for_each_later_than_the_one_before(wi
 
 
 @pytest.mark.parametrize("count", [0, 601, 2**32 - 1])
-def test_a_request_for_no_or_too_many_frames_warns_and_gives_none(wire, count):
+def test_a_request_for_no_or_too_many_frames_warns_and_gives_none(wire: Wire, count: int) -> None:
     wire.give(REQUEST, conversions.uint32(count))
     assert not wire.component.busy
     assert len(wire.warnings) == 1
 
 
-def test_the_leader_has_no_camera(wire):
+def test_the_leader_has_no_camera(wire: Wire) -> None:
     assert "leader/camera/request" not in wire.inputs
 
 
-def test_a_robot_that_takes_too_long_is_warned_of():
+def test_a_robot_that_takes_too_long_is_warned_of() -> None:
     wire = wired("world", "", surface="plane", motion_timeout_s=0.1, camera={"mode": "on_demand"})
     wire.component.start()
     wire.give(COMMANDS, command((50.0,) * 4))
     run(wire)
     assert "took too long" in wire.warnings[0]
-    wire.component._world.close()
+    world_of(wire).close()
 
 
 @pytest.mark.parametrize("values", [{"robots": ["leader", "leader"]}, {"robots": ["leader"]}, {"start_x_m": [0.1]}])
-def test_robots_need_different_names_and_a_start_each(values):
+def test_robots_need_different_names_and_a_start_each(values: dict[str, list[float | str]]) -> None:
     with pytest.raises(ParameterError, match="'robots' must differ and have one"):
         wired("world", "", **values)
 
 
-def test_surface_parameters_are_names_and_numbers():
+def test_surface_parameters_are_names_and_numbers() -> None:
     assert surface_from_texts("plane", ("height_m=0.1",)).height(0.5, 0.5) == 0.1
     for bad in ("height_m", "height_m=", "height_m=high"):
         with pytest.raises(ParameterError, match="plane"):
             surface_from_texts("plane", (bad,))
 
 
-def test_an_unknown_surface_is_refused_with_the_near_name():
+def test_an_unknown_surface_is_refused_with_the_near_name() -> None:
     with pytest.raises(ParameterError, match="did you mean 'bowl'"):
         wired("world", "", surface="bowll")
 
 
 @pytest.mark.parametrize("name", ["plane", "bowl"])
-def test_the_mesh_covers_the_plate_once_at_the_surfaces_heights_and_faces_up(name):
+def test_the_mesh_covers_the_plate_once_at_the_surfaces_heights_and_faces_up(name: str) -> None:
     surface = make_surface(name)
     vertices, colours, triangles = surface_mesh(surface)
     for x, y, z in vertices[::97]:

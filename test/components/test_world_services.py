@@ -2,6 +2,9 @@
 
 import math
 import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import pytest
 from sensor_msgs.msg import JointState
@@ -24,47 +27,48 @@ pytestmark = pytest.mark.slow
 STRAIGHT = conversions.joint_command(WheelCommand((1.6,) * 4, (4.0,) * 4), 0)
 
 
-def parameters(**values):
+def parameters(**values: Any) -> WorldNodeParameters:
     return from_mapping(WorldNodeParameters, {"camera": {"mode": "on_demand"}, **values}, where="test")
 
 
 class Hosted:
     """A world component with what it sent and said."""
 
-    def __init__(self, **values):
+    def __init__(self, **values: Any) -> None:
         self.component = WorldComponent(parameters(**values), Place(""))
-        self.sent, self.said = [], []
+        self.sent: list[tuple[str, Any]] = []
+        self.said: list[str] = []
         self.component.attach(
             lambda topic, message: self.sent.append((topic.name, message)), lambda level, text: self.said.append(text)
         )
         self.component.start()
 
-    def give(self, topic, message):
+    def give(self, topic: str, message: Any) -> None:
         (handler,) = [entry.handler for entry in self.component.inputs() if entry.topic.name == topic]
         handler(message)
 
-    def run(self):
+    def run(self) -> None:
         while self.component.busy:
             self.component.work()
 
-    def stranger(self):
+    def stranger(self) -> None:
         """What a stranger does to the world: drives both robots and looks."""
         for robot in ("leader", "follower_1"):
             self.give(f"{robot}/joint_commands", STRAIGHT)
             self.give("follower_1/camera/request", conversions.uint32(2))
             self.run()
 
-    def of(self, topic):
+    def of(self, topic: str) -> list[Any]:
         return [message for name, message in self.sent if name == topic]
 
-    def call(self, service):
+    def call(self, service: str) -> tuple[bool, str]:
         return self.component.services()[service]()
 
-    def pause(self, value):
+    def pause(self, value: bool) -> Any:
         return self.component.switches()["world/pause"](value)
 
 
-def facts(sent, start_ns):
+def facts(sent: Sequence[tuple[str, Any]], start_ns: int) -> list[Any]:
     """Stamped messages, with stamps counted from the world's start, to the last bit."""
     found = []
     for name, message in sent:
@@ -75,7 +79,7 @@ def facts(sent, start_ns):
     return found
 
 
-def test_a_reset_world_gives_the_same_run_as_a_fresh_one_at_later_stamps():
+def test_a_reset_world_gives_the_same_run_as_a_fresh_one_at_later_stamps() -> None:
     fresh = Hosted(seed=4)
     fresh.stranger()
     used = Hosted(seed=4)
@@ -99,7 +103,7 @@ def test_a_reset_world_gives_the_same_run_as_a_fresh_one_at_later_stamps():
     assert facts(used.sent, start) == facts(fresh.sent, 0)
 
 
-def test_a_reset_says_again_what_a_late_joiner_needs_and_time_never_goes_back():
+def test_a_reset_says_again_what_a_late_joiner_needs_and_time_never_goes_back() -> None:
     used = Hosted()
     used.stranger()
     used.call("world/reset")
@@ -116,12 +120,12 @@ def test_a_reset_says_again_what_a_late_joiner_needs_and_time_never_goes_back():
     assert clock == sorted(clock)
 
 
-def test_a_reset_before_anything_moved_asks_for_nothing():
+def test_a_reset_before_anything_moved_asks_for_nothing() -> None:
     assert Hosted(seed=4).call("world/reset") == (True, "seed 4, from 1 s on")
 
 
-def test_drives_and_detectors_need_no_restart_after_a_reset():
-    def moved(resets):
+def test_drives_and_detectors_need_no_restart_after_a_reset() -> None:
+    def moved(resets: int) -> Any:
         world = Hosted(seed=4, robots=["leader"], start_x_m=[0.7], start_y_m=[0.4], start_heading_rad=[1.0])
         drive, results = DriveComponent(DriveParameters(), Place("leader")), []
         drive.attach(
@@ -134,7 +138,7 @@ def test_drives_and_detectors_need_no_restart_after_a_reset():
         )
         move, joints = (entry.handler for entry in drive.inputs())
 
-        def drive_once():
+        def drive_once() -> None:
             move(conversions.move(Motion(x_m=0.05), "leader/base_link", world.component.stamp_ns))
             while world.component.busy:
                 done = len(world.sent)
@@ -167,7 +171,7 @@ def test_drives_and_detectors_need_no_restart_after_a_reset():
     assert detector.health().level == 0
 
 
-def test_a_reset_takes_seed_surface_and_starts_that_were_set_before():
+def test_a_reset_takes_seed_surface_and_starts_that_were_set_before() -> None:
     used = Hosted(seed=1)
     used.component.set_parameters(
         parameters(seed=2, surface="ripple", start_x_m=[0.6, 0.92], start_y_m=[0.5, 0.5], camera={"mode": "stream"})
@@ -186,14 +190,14 @@ def test_a_reset_takes_seed_surface_and_starts_that_were_set_before():
         ({"start_x_m": [0.5, 3.0]}, "beyond the plate"),
     ],
 )
-def test_parameters_that_no_reset_could_take_are_refused_at_once(values, says):
+def test_parameters_that_no_reset_could_take_are_refused_at_once(values: Any, says: str) -> None:
     used = Hosted()
     with pytest.raises(ValueError, match=says):
         used.component.set_parameters(parameters(**values))
     assert used.call("world/reset")[0]
 
 
-def test_a_reset_that_cannot_be_leaves_the_world_as_it_is():
+def test_a_reset_that_cannot_be_leaves_the_world_as_it_is() -> None:
     used = Hosted()
     used.stranger()
     used.component.set_parameters(parameters(start_x_m=[0.7, 0.75]))
@@ -207,7 +211,7 @@ def test_a_reset_that_cannot_be_leaves_the_world_as_it_is():
     assert used.component.stamp_ns > before
 
 
-def test_a_paused_world_stands_still_and_steps_on_request_without_changing_the_run():
+def test_a_paused_world_stands_still_and_steps_on_request_without_changing_the_run() -> None:
     free, paused = Hosted(seed=4), Hosted(seed=4)
     free.stranger()
     assert paused.call("world/step") == (False, "the world runs: call world/pause with true first")
@@ -228,7 +232,9 @@ def test_a_paused_world_stands_still_and_steps_on_request_without_changing_the_r
     assert facts(paused.sent, 0) == facts(free.sent, 0)
 
 
-def command(joints=WHEELS, angles=(1.0,) * 4, speeds=(4.0,) * 4):
+def command(
+    joints: Sequence[str] = WHEELS, angles: Sequence[float] = (1.0,) * 4, speeds: Sequence[float] = (4.0,) * 4
+) -> Any:
     return JointState(name=list(joints), position=list(angles), velocity=list(speeds))
 
 
@@ -251,7 +257,7 @@ def command(joints=WHEELS, angles=(1.0,) * 4, speeds=(4.0,) * 4):
         (JointState(), "must name"),
     ],
 )
-def test_a_bad_command_is_refused_with_a_diagnostic_and_moves_nothing(message, says):
+def test_a_bad_command_is_refused_with_a_diagnostic_and_moves_nothing(message: Any, says: str) -> None:
     used = Hosted()
     before = used.component._world.ground_truth("leader")
     used.give("leader/joint_commands", message)
@@ -263,7 +269,7 @@ def test_a_bad_command_is_refused_with_a_diagnostic_and_moves_nothing(message, s
     assert "nothing moves" in health.text
 
 
-def test_a_robot_that_leaves_the_plate_ends_the_run_with_code_3_and_a_reason():
+def test_a_robot_that_leaves_the_plate_ends_the_run_with_code_3_and_a_reason() -> None:
     used = Hosted(start_y_m=[1.7, 0.5])
     used.give("leader/joint_commands", conversions.joint_command(WheelCommand((8.0,) * 4, (4.0,) * 4), 0))
     while used.component.busy and used.component.exit_code is None:
@@ -276,7 +282,7 @@ def test_a_robot_that_leaves_the_plate_ends_the_run_with_code_3_and_a_reason():
     assert [message.data for message in used.of(names.left_plate().name)] == ["leader"]
 
 
-def test_a_run_can_go_on_with_a_robot_beyond_the_plate_until_a_reset():
+def test_a_run_can_go_on_with_a_robot_beyond_the_plate_until_a_reset() -> None:
     used = Hosted(start_y_m=[1.7, 0.5], leaving_ends_run=False)
     for _ in range(2):
         used.give("leader/joint_commands", conversions.joint_command(WheelCommand((8.0,) * 4, (4.0,) * 4), 0))
@@ -289,7 +295,7 @@ def test_a_run_can_go_on_with_a_robot_beyond_the_plate_until_a_reset():
     assert len(used.of(names.left_plate().name)) == 2
 
 
-def short(*settings, track="one"):
+def short(*settings: str, track: str = "one") -> Any:
     return scenarios.override(
         scenarios.load_track(track), ["seed=3", "leader.timesteps=2", "world.camera.mode=on_demand", *settings]
     )
@@ -297,20 +303,22 @@ def short(*settings, track="one"):
 
 @pytest.mark.parametrize("surface", sorted(SURFACES))
 @pytest.mark.parametrize("track", ["one", "two"])
-def test_a_run_on_every_surface_ends_done_or_lost(surface, track):
+def test_a_run_on_every_surface_ends_done_or_lost(surface: str, track: str) -> None:
     scenario = scenarios.with_surface(short(track=track), surface)
     scenario.check()
     assert run_in_process(scenario, None, {}).exit_code in (0, 3)
 
 
-def test_a_run_ends_with_3_when_the_leader_drives_off_the_plate():
+def test_a_run_ends_with_3_when_the_leader_drives_off_the_plate() -> None:
     result = run_in_process(short("start_y_m=1.7", "leader.timesteps=5"), None, {})
     assert result.exit_code == 3
     assert "leader has left the plate" in result.reason
 
 
 @pytest.mark.parametrize(("track", "followers", "fits"), [("one", 3, True), ("one", 4, False), ("two", 2, False)])
-def test_followers_that_would_start_beyond_the_plate_are_refused_before_anything_starts(track, followers, fits):
+def test_followers_that_would_start_beyond_the_plate_are_refused_before_anything_starts(
+    track: str, followers: int, fits: bool
+) -> None:
     scenario = short(f"followers={followers}", track=track)
     if fits:
         scenario.check()
@@ -319,6 +327,6 @@ def test_followers_that_would_start_beyond_the_plate_are_refused_before_anything
         scenario.check()
 
 
-def test_a_height_map_can_be_named_in_a_scenario(tmp_path):
+def test_a_height_map_can_be_named_in_a_scenario(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"nowhere.npy: can't read it"):
         short("world.surface=heightmap", f"world.surface_parameters=['file={tmp_path}/nowhere.npy']").check()

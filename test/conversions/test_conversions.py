@@ -2,12 +2,15 @@
 
 import array
 import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
 from sensor_msgs.msg import Image, JointState, PointField
 
 from robot_formation import conversions
@@ -25,12 +28,12 @@ four = st.tuples(angles, angles, angles, angles)
 NOT_NUMBERS = [math.nan, math.inf, -math.inf]
 
 
-def over_the_wire(message, type_name):
+def over_the_wire(message: Any, type_name: str) -> Any:
     """The message after a trip through CDR."""
     return conversions.from_cdr(conversions.to_cdr(message), type_name)
 
 
-def refusal(read, message):
+def refusal(read: Callable[[Any], object], message: Any) -> str:
     with pytest.raises(MessageError) as caught:
         read(message)
     assert "\n" not in str(caught.value)
@@ -41,14 +44,14 @@ def refusal(read, message):
 
 
 @given(stamp=st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1))
-def test_nanoseconds_come_back_exactly(stamp):
+def test_nanoseconds_come_back_exactly(stamp: int) -> None:
     time = conversions.to_time(stamp)
     assert 0 <= time.nanosec < 10**9
     assert conversions.to_ns(time) == stamp
 
 
 @given(stamp=stamps)
-def test_headers_and_the_clock_carry_the_stamp(stamp):
+def test_headers_and_the_clock_carry_the_stamp(stamp: int) -> None:
     assert conversions.stamp_of(conversions.move(Motion(), "leader/base_link", stamp)) == stamp
     assert conversions.to_ns(conversions.clock(stamp).clock) == stamp
 
@@ -57,7 +60,9 @@ def test_headers_and_the_clock_carry_the_stamp(stamp):
 
 
 @given(angles_rad=four, limits=four, stamp=stamps)
-def test_a_wheel_command_comes_back_the_same(angles_rad, limits, stamp):
+def test_a_wheel_command_comes_back_the_same(
+    angles_rad: tuple[float, float, float, float], limits: tuple[float, float, float, float], stamp: int
+) -> None:
     command = WheelCommand(angles_rad, limits)
     message = over_the_wire(conversions.joint_command(command, stamp), "sensor_msgs/msg/JointState")
     assert conversions.read_joint_command(message) == command
@@ -65,7 +70,7 @@ def test_a_wheel_command_comes_back_the_same(angles_rad, limits, stamp):
 
 
 @given(order=st.permutations(range(4)))
-def test_a_wheel_command_is_read_in_any_joint_order(order):
+def test_a_wheel_command_is_read_in_any_joint_order(order: list[int]) -> None:
     values = [1.0, 2.0, 3.0, 4.0]
     message = JointState(
         name=[WHEELS[i] for i in order],
@@ -75,7 +80,9 @@ def test_a_wheel_command_is_read_in_any_joint_order(order):
     assert conversions.read_joint_command(message) == WheelCommand((1.0, 2.0, 3.0, 4.0), (10.0, 20.0, 30.0, 40.0))
 
 
-def command(names=WHEELS, position=(1.0,) * 4, velocity=(1.0,) * 4):
+def command(
+    names: Sequence[str] = WHEELS, position: Sequence[float] = (1.0,) * 4, velocity: Sequence[float] = (1.0,) * 4
+) -> Any:
     return JointState(name=list(names), position=list(position), velocity=list(velocity))
 
 
@@ -94,7 +101,7 @@ def command(names=WHEELS, position=(1.0,) * 4, velocity=(1.0,) * 4):
         (command(position=(0, 0, -1e300, 0)), "absurd"),
     ],
 )
-def test_a_wheel_command_that_cannot_be_meant_is_refused(message, words):
+def test_a_wheel_command_that_cannot_be_meant_is_refused(message: Any, words: str) -> None:
     with pytest.raises(MessageError, match=words):
         conversions.read_joint_command(message)
     assert "joint_commands" in refusal(conversions.read_joint_command, message)
@@ -103,17 +110,19 @@ def test_a_wheel_command_that_cannot_be_meant_is_refused(message, words):
 @pytest.mark.parametrize("bad", NOT_NUMBERS)
 @pytest.mark.parametrize("place", range(4))
 @pytest.mark.parametrize("field", ["position", "velocity"])
-def test_no_wheel_command_that_is_not_finite_passes(field, place, bad):
-    values = [1.0] * 4
-    values[place] = bad
-    assert "finite" in refusal(conversions.read_joint_command, command(**{field: values}))
+def test_no_wheel_command_that_is_not_finite_passes(field: str, place: int, bad: float) -> None:
+    values: dict[str, Any] = {field: [1.0] * 4}
+    values[field][place] = bad
+    assert "finite" in refusal(conversions.read_joint_command, command(**values))
 
 
 six = st.lists(finite, min_size=6, max_size=6)
 
 
 @given(positions=six, velocities=six, stamp=stamps, order=st.permutations(range(6)))
-def test_joint_states_come_back_in_the_order_of_the_drive(positions, velocities, stamp, order):
+def test_joint_states_come_back_in_the_order_of_the_drive(
+    positions: list[float], velocities: list[float], stamp: int, order: list[int]
+) -> None:
     message = over_the_wire(
         conversions.joint_states(
             [JOINTS[i] for i in order], [positions[i] for i in order], [velocities[i] for i in order], stamp
@@ -124,7 +133,7 @@ def test_joint_states_come_back_in_the_order_of_the_drive(positions, velocities,
     assert conversions.stamp_of(message) == stamp
 
 
-def test_joints_that_the_drive_does_not_know_are_left_out():
+def test_joints_that_the_drive_does_not_know_are_left_out() -> None:
     message = conversions.joint_states(["arm", *JOINTS], range(7), range(7), 0)
     assert conversions.read_joint_states(message)[0] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
 
@@ -139,34 +148,36 @@ def test_joints_that_the_drive_does_not_know_are_left_out():
     ],
     ids=["nothing", "a joint missing", "a value missing", "a joint twice"],
 )
-def test_joint_states_that_leave_something_out_are_refused(names, count, words):
+def test_joint_states_that_leave_something_out_are_refused(names: Sequence[str], count: int, words: str) -> None:
     message = conversions.joint_states(names, [0.0] * count, [0.0] * count, 0)
     assert words in refusal(conversions.read_joint_states, message)
 
 
-def test_joint_states_without_velocities_are_refused():
+def test_joint_states_without_velocities_are_refused() -> None:
     assert "one velocity" in refusal(conversions.read_joint_states, conversions.joint_states(JOINTS, [0.0] * 6, [], 0))
 
 
 @pytest.mark.parametrize("bad", NOT_NUMBERS)
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("field", [0, 1])
-def test_no_joint_states_that_are_not_finite_pass(field, place, bad):
+def test_no_joint_states_that_are_not_finite_pass(field: int, place: int, bad: float) -> None:
     values = [[0.0] * 6, [0.0] * 6]
     values[field][place] = bad
-    assert "finite" in refusal(conversions.read_joint_states, conversions.joint_states(JOINTS, *values, 0))
+    positions, velocities = values
+    message = conversions.joint_states(JOINTS, positions, velocities, 0)
+    assert "finite" in refusal(conversions.read_joint_states, message)
 
 
 # --- planar motions ---------------------------------------------------------------------------------------------------
 
 
-def close(found, expected):
+def close(found: Motion, expected: Motion) -> None:
     assert (found.x_m, found.y_m) == (expected.x_m, expected.y_m)
     assert found.yaw_rad == pytest.approx(expected.yaw_rad, abs=1e-15)
 
 
 @given(motion=motions, stamp=stamps)
-def test_a_move_comes_back_the_same(motion, stamp):
+def test_a_move_comes_back_the_same(motion: Motion, stamp: int) -> None:
     message = over_the_wire(conversions.move(motion, "follower_1/base_link", stamp), "geometry_msgs/msg/PoseStamped")
     close(conversions.read_move(message), motion)
     assert message.header.frame_id == "follower_1/base_link"
@@ -174,7 +185,9 @@ def test_a_move_comes_back_the_same(motion, stamp):
 
 
 @given(motion=motions, stamp=stamps, variances=st.tuples(lengths, lengths, lengths, lengths))
-def test_a_displacement_comes_back_with_its_covariance_in_the_corner_of_x_and_y(motion, stamp, variances):
+def test_a_displacement_comes_back_with_its_covariance_in_the_corner_of_x_and_y(
+    motion: Motion, stamp: int, variances: tuple[float, float, float, float]
+) -> None:
     message = over_the_wire(
         conversions.displacement(motion, "leader/base_link", stamp, variances),
         "geometry_msgs/msg/PoseWithCovarianceStamped",
@@ -188,8 +201,8 @@ def test_a_displacement_comes_back_with_its_covariance_in_the_corner_of_x_and_y(
     assert message.header.frame_id == "leader/base_link"
 
 
-def test_no_estimate_is_told_from_an_estimate():
-    def of(covariance):
+def test_no_estimate_is_told_from_an_estimate() -> None:
+    def of(covariance: Sequence[float]) -> bool:
         return conversions.has_estimate(conversions.displacement(Motion(), "", 0, covariance))
 
     assert of((0.0,) * 4)
@@ -200,7 +213,7 @@ def test_no_estimate_is_told_from_an_estimate():
 
 @pytest.mark.parametrize("bad", NOT_NUMBERS)
 @pytest.mark.parametrize("part", ["position.x", "position.y", "orientation.x", "orientation.z", "orientation.w"])
-def test_what_is_not_finite_in_a_pose_stays_so_for_the_core_to_refuse(part, bad):
+def test_what_is_not_finite_in_a_pose_stays_so_for_the_core_to_refuse(part: str, bad: float) -> None:
     message = conversions.move(Motion(0.1, 0.2, 0.3), "base_link", 0)
     group, component = part.split(".")
     setattr(getattr(message.pose, group), component, bad)
@@ -208,7 +221,7 @@ def test_what_is_not_finite_in_a_pose_stays_so_for_the_core_to_refuse(part, bad)
 
 
 @given(yaw=st.floats(-3.14, 3.14), length=st.floats(1e-3, 1e3))
-def test_a_quaternion_of_any_length_gives_its_yaw(yaw, length):
+def test_a_quaternion_of_any_length_gives_its_yaw(yaw: float, length: float) -> None:
     message = conversions.move(Motion(yaw_rad=yaw), "base_link", 0)
     message.pose.orientation.z *= length
     message.pose.orientation.w *= length
@@ -216,8 +229,8 @@ def test_a_quaternion_of_any_length_gives_its_yaw(yaw, length):
 
 
 @given(roll=st.floats(-0.5, 0.5), pitch=st.floats(-0.5, 0.5), yaw=st.floats(-3.14, 3.14))
-def test_yaw_is_read_from_a_tilted_pose_too(roll, pitch, yaw):
-    def about(axis, angle):
+def test_yaw_is_read_from_a_tilted_pose_too(roll: float, pitch: float, yaw: float) -> None:
+    def about(axis: int, angle: float) -> NDArray[np.float64]:
         c, s = math.cos(angle), math.sin(angle)
         matrix = np.eye(3)
         i, j = [(1, 2), (2, 0), (0, 1)][axis]
@@ -245,13 +258,13 @@ def test_yaw_is_read_from_a_tilted_pose_too(roll, pitch, yaw):
     assert found.yaw_rad == pytest.approx(yaw, abs=1e-9)
 
 
-def test_an_orientation_of_zeros_is_no_turn():
+def test_an_orientation_of_zeros_is_no_turn() -> None:
     message = conversions.move(Motion(0.1), "base_link", 0)
     message.pose.orientation.w = 0.0
     assert conversions.read_move(message) == Motion(0.1)
 
 
-def test_odometry_has_its_frames_pose_and_velocities_in_their_fields():
+def test_odometry_has_its_frames_pose_and_velocities_in_their_fields() -> None:
     message = conversions.body_odometry(
         (1, 2, 3), (0, 0, 0, 1), (4, 5, 6), (7, 8, 9), frame="world", child="leader/base_link", stamp_ns=5
     )
@@ -274,7 +287,7 @@ pictures = st.tuples(st.integers(1, 9), st.integers(1, 9)).flatmap(
 
 @settings(deadline=None)
 @given(pixels=pictures, stamp=stamps)
-def test_a_picture_comes_back_the_same(pixels, stamp):
+def test_a_picture_comes_back_the_same(pixels: NDArray[np.uint8], stamp: int) -> None:
     message = over_the_wire(conversions.image(pixels, "camera", stamp), "sensor_msgs/msg/Image")
     assert (conversions.read_image(message) == pixels).all()
     assert (message.height, message.width) == pixels.shape[:2]
@@ -284,7 +297,9 @@ def test_a_picture_comes_back_the_same(pixels, stamp):
 
 @settings(deadline=None)
 @given(pixels=pictures, padding=st.integers(0, 5), swapped=st.booleans())
-def test_padded_rows_and_the_other_order_of_colours_are_read_too(pixels, padding, swapped):
+def test_padded_rows_and_the_other_order_of_colours_are_read_too(
+    pixels: NDArray[np.uint8], padding: int, swapped: bool
+) -> None:
     height, width = pixels.shape[:2]
     rows = np.full((height, 3 * width + padding), 77, np.uint8)
     rows[:, : 3 * width] = (pixels[:, :, ::-1] if swapped else pixels).reshape(height, -1)
@@ -293,7 +308,7 @@ def test_padded_rows_and_the_other_order_of_colours_are_read_too(pixels, padding
     assert (conversions.read_image(message) == pixels).all()
 
 
-def picture(**values):
+def picture(**values: Any) -> Any:
     message = conversions.image(np.zeros((4, 5, 3), np.uint8), "camera", 0)
     for name, value in values.items():
         setattr(message, name, value)
@@ -317,11 +332,11 @@ def picture(**values):
         (Image(), "''"),
     ],
 )
-def test_a_picture_that_is_cut_off_or_colourless_is_refused(message, words):
+def test_a_picture_that_is_cut_off_or_colourless_is_refused(message: Any, words: str) -> None:
     assert words in refusal(conversions.read_image, message)
 
 
-def test_the_camera_matrix_projects_as_a_pinhole_camera():
+def test_the_camera_matrix_projects_as_a_pinhole_camera() -> None:
     info = conversions.camera_info(316, 208, 273.7, (157.5, 103.5), "camera", 5)
     k, p = np.reshape(info.k, (3, 3)), np.reshape(info.p, (3, 4))
     point = np.array([0.1, -0.05, 0.5, 1.0])
@@ -341,14 +356,14 @@ block_lists = st.lists(st.builds(Block, u16, u16, u16, u16, u16, st.integers(-(2
 
 @settings(deadline=None)
 @given(found=block_lists, stamp=stamps)
-def test_blocks_come_back_the_same_also_when_there_are_none(found, stamp):
+def test_blocks_come_back_the_same_also_when_there_are_none(found: list[Block], stamp: int) -> None:
     message = over_the_wire(conversions.blocks(found, "camera", stamp), "sensor_msgs/msg/PointCloud2")
     assert conversions.read_blocks(message) == found
     assert (message.width, message.height) == (len(found), 1)
     assert (message.header.frame_id, conversions.stamp_of(message)) == ("camera", stamp)
 
 
-def test_blocks_can_be_decoded_by_their_own_fields_alone():
+def test_blocks_can_be_decoded_by_their_own_fields_alone() -> None:
     # As any point cloud reader does it, without this package's record type.
     found = [Block(1, 2, 3, 4, 5, -6, 7, 8), Block(3, 300, 200, 50, 49, 0, 255, 255)]
     message = conversions.blocks(found, "camera", 0)
@@ -362,18 +377,19 @@ def test_blocks_can_be_decoded_by_their_own_fields_alone():
         }
     )
     table = np.frombuffer(bytes(message.data), layout)
+    assert layout.names is not None
     assert [Block(**{name: int(row[name]) for name in layout.names}) for row in table] == found
     assert message.row_step == message.point_step * message.width
 
 
-def block_message(**values):
+def block_message(**values: Any) -> Any:
     message = conversions.blocks([Block(1, 158, 60, 49, 49)], "camera", 0)
     for name, value in values.items():
         setattr(message, name, value)
     return message
 
 
-def fields(change):
+def fields(change: Callable[[list[Any]], object]) -> list[Any]:
     """The fields of blocks with one changed."""
     found = [
         PointField(name=field.name, offset=field.offset, datatype=field.datatype, count=field.count)
@@ -397,13 +413,13 @@ def fields(change):
     ],
     ids=["no fields", "one less", "another order", "another name", "another offset", "another type", "step", "endian"],
 )
-def test_points_that_are_not_laid_out_as_blocks_are_refused(message):
+def test_points_that_are_not_laid_out_as_blocks_are_refused(message: Any) -> None:
     words = refusal(conversions.read_blocks, message)
     assert "packed little-endian fields signature uint16, x uint16" in words
 
 
 @pytest.mark.parametrize("values", [{"width": 2}, {"width": 0}, {"height": 2}, {"data": array.array("B", bytes(13))}])
-def test_blocks_whose_number_and_bytes_disagree_are_refused(values):
+def test_blocks_whose_number_and_bytes_disagree_are_refused(values: Any) -> None:
     assert "cut off or mis-sized" in refusal(conversions.read_blocks, block_message(**values))
 
 
@@ -411,16 +427,16 @@ def test_blocks_whose_number_and_bytes_disagree_are_refused(values):
 
 
 @given(value=st.integers(0, 2**32 - 1))
-def test_a_tick_comes_back_the_same(value):
+def test_a_tick_comes_back_the_same(value: int) -> None:
     assert over_the_wire(conversions.uint32(value), "std_msgs/msg/UInt32").data == value
 
 
 @given(text=st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0")))
-def test_a_text_comes_back_the_same(text):
+def test_a_text_comes_back_the_same(text: str) -> None:
     assert over_the_wire(conversions.string(text), "std_msgs/msg/String").data == text
 
 
-def test_health_has_its_level_text_and_values():
+def test_health_has_its_level_text_and_values() -> None:
     message = over_the_wire(
         conversions.diagnostics("/leader/drive", 1, "slow", {"warnings": "3"}, 7), "diagnostic_msgs/msg/DiagnosticArray"
     )
@@ -429,7 +445,7 @@ def test_health_has_its_level_text_and_values():
     assert [(entry.key, entry.value) for entry in status.values] == [("warnings", "3")]
 
 
-def test_a_mesh_becomes_three_coloured_corners_per_triangle():
+def test_a_mesh_becomes_three_coloured_corners_per_triangle() -> None:
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]])
     colours = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     marker = conversions.surface_marker(vertices, colours, np.array([[0, 1, 3], [0, 3, 2]]), "world")

@@ -3,7 +3,9 @@
 import itertools
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,15 +13,22 @@ import pytest
 from alignment_grid import equipment
 from robot_formation import exit_codes
 from robot_formation.analysis.from_bag import load_run
-from robot_formation.analysis.quantities import analyse
+from robot_formation.analysis.quantities import RunAnalysis, analyse
+from robot_formation.analysis.run_record import RunRecord
 from robot_formation.bag.reader import read_bag
-from robot_formation.calibration.alignment_trial import AlignmentTrial, Start
+from robot_formation.calibration.alignment_trial import AlignmentTrial, SeenFrame, Start, Trial
 from robot_formation.experiment.in_process import run_in_process
+from robot_formation.experiment.run_result import RunResult
 from robot_formation.experiment.scenario import load_track, override
+from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.picture import Picture
 
 pytestmark = pytest.mark.slow
+
+Tamper = Callable[[SeenFrame], list[SeenFrame]]
+Spoil = Callable[[Picture, int], Picture]
 
 LOOK = 22  # frames
 BESIDE = Start(0.36, -0.05, 0.0)
@@ -27,11 +36,11 @@ GREY = 90
 EQUIPMENT = equipment("precise", ["fine_tuner.precise.certain_rad=0.03"])
 
 
-def align(tamper=None, spoil=None, seed=3):
+def align(tamper: Tamper | None = None, spoil: Spoil | None = None, seed: int = 3) -> Trial:
     return AlignmentTrial(EQUIPMENT, BESIDE, seed, tamper, spoil).run()
 
 
-def assert_in_formation(trial):
+def assert_in_formation(trial: Trial) -> None:
     assert trial.outcome == "aligned"
     u_m, v_m, heading_rad = trial.errors
     assert abs(u_m) < 0.015
@@ -40,74 +49,74 @@ def assert_in_formation(trial):
     assert not trial.touched
 
 
-def words(trial):
+def words(trial: Trial) -> list[str]:
     return [state.split(":")[0] for state in trial.states]
 
 
-def during(first, last, disturbance):
+def during(first: int, last: int, disturbance: Callable[[Picture], Picture]) -> Spoil:
     """A disturbance of the frames first to last - 1."""
     return lambda picture, number: disturbance(picture) if first <= number < last else picture
 
 
-def marker_box(picture):
+def marker_box(picture: Picture) -> tuple[slice, slice]:
     """Rows and columns of the saturated colours: the marker."""
     colour = picture.max(axis=2).astype(int) - picture.min(axis=2)
     rows, columns = np.nonzero(colour > 70)
     return slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
 
 
-def hidden(picture):
-    changed = picture.copy()
+def hidden(picture: Picture) -> Picture:
+    changed: Picture = picture.copy()
     changed[marker_box(picture)] = GREY
     return changed
 
 
-def half_covered(picture):
-    changed = picture.copy()
+def half_covered(picture: Picture) -> Picture:
+    changed: Picture = picture.copy()
     rows, columns = marker_box(picture)
     changed[rows, columns.start : (columns.start + columns.stop) // 2] = GREY
     return changed
 
 
-def test_without_any_disturbance_it_comes_into_formation():
+def test_without_any_disturbance_it_comes_into_formation() -> None:
     trial = align()
     assert_in_formation(trial)
     assert "hold" not in words(trial)
 
 
-def test_a_neighbour_that_is_hidden_for_a_while_is_reacquired():
+def test_a_neighbour_that_is_hidden_for_a_while_is_reacquired() -> None:
     trial = align(spoil=during(LOOK, 3 * LOOK, hidden))
     assert {"hold", "reacquired"} <= set(words(trial))
     assert_in_formation(trial)
 
 
-def test_a_neighbour_that_is_hidden_for_longer_is_searched_for():
+def test_a_neighbour_that_is_hidden_for_longer_is_searched_for() -> None:
     trial = align(spoil=during(LOOK, 6 * LOOK, hidden))
     assert words(trial).index("hold") < words(trial).index("search") < words(trial).index("reacquired")
     assert_in_formation(trial)
 
 
-def test_a_neighbour_that_is_gone_for_good_is_lost_after_a_bound():
+def test_a_neighbour_that_is_gone_for_good_is_lost_after_a_bound() -> None:
     trial = align(spoil=during(LOOK, 10**9, hidden))
     assert trial.outcome == "lost"
     assert words(trial).count("search") <= 10
 
 
-def test_a_marker_that_is_partly_covered_for_a_while_is_waited_for():
+def test_a_marker_that_is_partly_covered_for_a_while_is_waited_for() -> None:
     trial = align(spoil=during(LOOK, 3 * LOOK, half_covered))
     assert_in_formation(trial)
 
 
 @pytest.mark.parametrize("since", [0, LOOK])
 @pytest.mark.parametrize("corner", [(130, 20), (150, 270)])
-def test_an_object_of_the_targets_colour_is_no_neighbour(corner, since):
+def test_an_object_of_the_targets_colour_is_no_neighbour(corner: tuple[int, int], since: int) -> None:
     patches = []
 
-    def distract(picture, number):
+    def distract(picture: Picture, number: int) -> Picture:
         if number == 0:
             rows, columns = marker_box(picture)
             patches.append(picture[rows, columns][:30, :30].copy())
-        changed = picture.copy()
+        changed: Picture = picture.copy()
         row, column = corner
         if number >= since:
             changed[row : row + 30, column : column + 30] = patches[0]
@@ -116,31 +125,32 @@ def test_an_object_of_the_targets_colour_is_no_neighbour(corner, since):
     assert_in_formation(align(spoil=distract))
 
 
-def test_light_that_changes_is_no_matter():
-    def dim(picture, number):
-        return np.clip(picture * (0.85 + 0.15 * math.sin(0.1 * number)), 0, 255).astype(np.uint8)
+def test_light_that_changes_is_no_matter() -> None:
+    def dim(picture: Picture, number: int) -> Picture:
+        dimmed: Picture = np.clip(picture * (0.85 + 0.15 * math.sin(0.1 * number)), 0, 255).astype(np.uint8)
+        return dimmed
 
     assert_in_formation(align(spoil=dim))
 
 
-def test_blocks_that_flicker_do_not_lead_astray():
+def test_blocks_that_flicker_do_not_lead_astray() -> None:
     rng = np.random.default_rng(5)
     trial = align(tamper=lambda frame: [replace(frame, blocks=[b for b in frame.blocks if rng.random() > 0.15])])
     assert_in_formation(trial)
 
 
-def test_a_missing_frame_is_asked_for_again():
+def test_a_missing_frame_is_asked_for_again() -> None:
     count = iter(range(10**9))
     trial = align(tamper=lambda frame: [] if next(count) % 7 == 3 else [frame])
     assert_in_formation(trial)
 
 
 @pytest.mark.parametrize("lag", [1, 4, LOOK + 8])
-def test_late_frames_do_not_count(lag):
+def test_late_frames_do_not_count(lag: int) -> None:
     """Frames arrive when `lag` newer ones have been taken: the first after a move still show what was before it."""
-    under_way = deque()
+    under_way: deque[SeenFrame] = deque()
 
-    def late(frame):
+    def late(frame: SeenFrame) -> list[SeenFrame]:
         under_way.append(frame)
         return [under_way.popleft()] if len(under_way) > lag else []
 
@@ -149,7 +159,7 @@ def test_late_frames_do_not_count(lag):
     assert "hold" not in words(trial)
 
 
-def test_a_dead_camera_loses_the_neighbour():
+def test_a_dead_camera_loses_the_neighbour() -> None:
     count = iter(range(10**9))
     trial = align(tamper=lambda frame: [] if next(count) > LOOK + 5 else [frame])
     assert trial.outcome == "lost"
@@ -160,43 +170,52 @@ def test_a_dead_camera_loses_the_neighbour():
 RUN = ["fine_tuner.mode=precise", "world.camera.mode=on_demand", "world.overhead.enabled=false", "leader.timesteps=4"]
 
 
-def run(tmp_path, monkeypatch, process):
+def run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, process: Callable[[int, list[Block]], list[Block]]
+) -> tuple[RunResult, RunAnalysis]:
     """Run with a stand-in for the detector's `process`, which takes the number of the frame and the true blocks."""
     frames = itertools.count()
     true_process = BlockDetector.process
 
-    def changed(self, picture, stamp_us):
+    def changed(self: BlockDetector, picture: Picture, stamp_us: int) -> list[Block]:
         return process(next(frames), true_process(self, picture, stamp_us))
 
     monkeypatch.setattr(BlockDetector, "process", changed)
     result = run_in_process(override(load_track("one"), RUN), tmp_path / "run", {})
+    assert result.bag is not None
     return result, analyse(load_run(result.bag))
 
 
-def states(analysis_or_record):
-    return [state.split(":")[0] for state in analysis_or_record.followers[0].states]
+def states(record: RunRecord) -> list[str]:
+    return [state.split(":")[0] for state in record.followers[0].states]
 
 
-def test_a_neighbour_that_vanishes_in_a_run_is_lost_and_the_bag_is_complete(tmp_path, monkeypatch):
+def test_a_neighbour_that_vanishes_in_a_run_is_lost_and_the_bag_is_complete(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     result, analysis = run(tmp_path, monkeypatch, lambda number, blocks: blocks if number < 5 * LOOK else [])
     assert result.exit_code == exit_codes.LOST
     assert analysis.outcome == "lost"
     assert 1 <= analysis.followers[0].totals["timesteps_finished"] < 4
+    assert result.bag is not None
     with read_bag(result.bag) as bag:
         assert not bag.recovered
 
 
-def test_a_neighbour_that_comes_back_in_a_run_is_reacquired(tmp_path, monkeypatch):
+def test_a_neighbour_that_comes_back_in_a_run_is_reacquired(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result, analysis = run(
         tmp_path, monkeypatch, lambda number, blocks: [] if 5 * LOOK <= number < 9 * LOOK else blocks
     )
     assert result.exit_code == exit_codes.DONE
+    assert result.bag is not None
     assert "reacquired" in states(load_run(result.bag))
     assert analysis.followers[0].totals["formation_error_rmse_m"] < 0.02
 
 
-def test_a_camera_that_dies_in_a_run_loses_the_neighbour_in_good_order(tmp_path, monkeypatch):
-    def die(number, blocks):
+def test_a_camera_that_dies_in_a_run_loses_the_neighbour_in_good_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def die(number: int, blocks: list[Block]) -> list[Block]:
         if number > 5 * LOOK:
             raise ClockError("the camera is dead")
         return blocks

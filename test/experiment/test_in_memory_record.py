@@ -1,5 +1,9 @@
 """A run in memory is analysed as the bag of the same run is."""
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import pytest
 
 from robot_formation.analysis.from_bag import load_run, run_topics
@@ -7,7 +11,8 @@ from robot_formation.analysis.quantities import analyse
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun, run_in_process
 from robot_formation.experiment.run_result import RunError
-from robot_formation.experiment.scenario import load_track, override
+from robot_formation.experiment.scenario import Scenario, load_track, override
+from robot_formation.names import Topic
 
 pytestmark = pytest.mark.slow
 
@@ -20,7 +25,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("settings", CASES.values(), ids=CASES)
-def test_the_analysis_is_that_of_the_bag_of_the_same_run(tmp_path, settings):
+def test_the_analysis_is_that_of_the_bag_of_the_same_run(tmp_path: Path, settings: list[str]) -> None:
     scenario = override(load_track("one"), [*BASE, *settings])
     details = {"scenario": scenario.setup.name, "timesteps": str(scenario.leader.timesteps)}
     result = run_in_process(scenario, tmp_path / "bag", details)
@@ -32,22 +37,22 @@ def test_the_analysis_is_that_of_the_bag_of_the_same_run(tmp_path, settings):
     assert repr(analyse(record).to_json()) == repr(analyse(recorded).to_json())
 
 
-def test_a_short_run_is_done_and_a_lost_one_lost():
+def test_a_short_run_is_done_and_a_lost_one_lost() -> None:
     done = analyse(run_in_memory(override(load_track("two"), ["leader.timesteps=1", "world.camera.mode=on_demand"])))
     assert (done.outcome, done.scenario) == ("done", "track_two")
     lost = analyse(run_in_memory(override(load_track("two"), [*BASE, "world.camera.pan_deg=-90"])))
     assert (lost.outcome, lost.followers[0].lost) == ("lost", True)
 
 
-def test_the_run_may_be_of_another_make_and_only_topics_of_the_analysis_are_kept():
+def test_the_run_may_be_of_another_make_and_only_topics_of_the_analysis_are_kept() -> None:
     seen, made = set(), []
 
     class Run(InProcessRun):
-        def _send(self, namespace, topic, message):
+        def _send(self, namespace: str, topic: Topic, message: Any) -> None:
             seen.add(topic.name)
             super()._send(namespace, topic, message)
 
-    def make_run(scenario, listen):
+    def make_run(scenario: Scenario, listen: Callable[[str, Any], None]) -> InProcessRun:
         made.append(Run(scenario, listen=listen))
         return made[0]
 
@@ -59,7 +64,7 @@ def test_the_run_may_be_of_another_make_and_only_topics_of_the_analysis_are_kept
     assert len(record.followers[0].displacements) == 1
 
 
-def test_a_run_that_stands_still_is_an_error():
+def test_a_run_that_stands_still_is_an_error() -> None:
     stuck = override(load_track("two"), [*BASE, "world.lockstep=[leader,follower_1]"])
     with pytest.raises(RunError, match="everybody waits"):
         run_in_memory(stuck)

@@ -1,6 +1,7 @@
 """The noise floor: what the ideal move is, and that a run really carries it out."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from robot_formation.experiment.oracle import IdealRun, TargetFace
 from robot_formation.experiment.scenario import load_track, override, with_surface
 from robot_formation.experiment.sweep import Task, run_task
 from robot_formation.geometry.orientation import quaternion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.world.camera import Camera
 from robot_formation.world.pose import Pose, pose_on_surface
 
@@ -24,18 +26,18 @@ ALIGNMENT = AlignmentParameters()
 PINHOLE = AlignmentParameters(side_px_m=273.7 * 0.06)
 
 
-def level(x_m, y_m, yaw_rad=0.0):
+def level(x_m: float, y_m: float, yaw_rad: float = 0.0) -> Pose:
     return Pose((x_m, y_m, 0.0), quaternion(0.0, 0.0, yaw_rad))
 
 
 @pytest.fixture(scope="module")
-def world():
+def world() -> WorldNodeParameters:
     scenario = with_surface(load_track("two"), "plane")
     return scenario.world
 
 
 @pytest.fixture(scope="module")
-def face(world):
+def face(world: WorldNodeParameters) -> TargetFace:
     return TargetFace(Camera(world.make_surface(), world), world)
 
 
@@ -43,7 +45,9 @@ def face(world):
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.7, -2.5])
-def test_at_the_ideal_place_there_is_no_offset_wherever_the_pair_stands(world, face, yaw_rad):
+def test_at_the_ideal_place_there_is_no_offset_wherever_the_pair_stands(
+    world: WorldNodeParameters, face: TargetFace, yaw_rad: float
+) -> None:
     assert PINHOLE.side_px_m == world.camera.focal_length_px * world.marker.edge_m
     right = (0.32 * math.sin(yaw_rad), -0.32 * math.cos(yaw_rad))
     neighbour = level(0.8, 0.9, yaw_rad)
@@ -55,7 +59,9 @@ def test_at_the_ideal_place_there_is_no_offset_wherever_the_pair_stands(world, f
 
 @pytest.mark.parametrize("x_m", [-0.04, -0.01, 0.0, 0.02, 0.05])
 @pytest.mark.parametrize("y_m", [-0.4, -0.34, -0.32, -0.3])
-def test_on_level_ground_the_offset_is_that_of_the_pinhole(world, face, x_m, y_m):
+def test_on_level_ground_the_offset_is_that_of_the_pinhole(
+    world: WorldNodeParameters, face: TargetFace, x_m: float, y_m: float
+) -> None:
     # Both robots head along x: the face is parallel to the picture, so its image is a square.
     camera, edge_m = world.camera, world.marker.edge_m
     depth_m = -edge_m / 2.0 - (y_m + camera.y_m)
@@ -66,7 +72,7 @@ def test_on_level_ground_the_offset_is_that_of_the_pinhole(world, face, x_m, y_m
     assert found[1] == pytest.approx(depth_m - ALIGNMENT.distance_m, abs=1e-12)
 
 
-def test_the_offset_points_from_the_robot_to_its_place(face):
+def test_the_offset_points_from_the_robot_to_its_place(face: TargetFace) -> None:
     ahead, behind = (face.offset(level(x, -0.32), level(0.0, 0.0), ALIGNMENT)[0] for x in (0.02, -0.02))
     assert ahead < -0.015 < 0.015 < behind
     far, near = (face.offset(level(0.0, y), level(0.0, 0.0), PINHOLE)[1] for y in (-0.36, -0.28))
@@ -74,7 +80,9 @@ def test_the_offset_points_from_the_robot_to_its_place(face):
     assert near == pytest.approx(-0.04, abs=1e-12)
 
 
-def test_on_a_bowl_too_the_offset_is_taken_from_all_corners_of_the_face(world, face):
+def test_on_a_bowl_too_the_offset_is_taken_from_all_corners_of_the_face(
+    world: WorldNodeParameters, face: TargetFace
+) -> None:
     scenario = with_surface(load_track("two"), "bowl")
     bowl = scenario.world.make_surface()
     robot, neighbour = pose_on_surface(bowl, 1.2, 0.5, 2.0), pose_on_surface(bowl, 0.95, 0.35, 2.05)
@@ -103,41 +111,43 @@ def test_on_a_bowl_too_the_offset_is_taken_from_all_corners_of_the_face(world, f
 class Story:
     """What an ideal run said, and what its predictor was told."""
 
-    def __init__(self, *settings, close, surface="plane"):
+    def __init__(self, *settings: str, close: bool, surface: str = "plane") -> None:
         scenario = with_surface(load_track("two"), surface)
         base = ["world.camera.mode=on_demand", f"leader.timesteps={TIMESTEPS}", "predictor.name=formation"]
         self.scenario = override(scenario, [*base, *settings])
-        self.messages = []
+        self.messages: list[tuple[str, Any]] = []
         self.run = IdealRun(self.scenario, lambda *entry: self.messages.append(entry), close=close)
         self.code, _ = self.run.run()
 
-    def of(self, topic):
+    def of(self, topic: str) -> list[Any]:
         return [message for name, message in self.messages if name == topic]
 
 
-def moves_of(story):
+def moves_of(story: Story) -> list[str]:
     """What the fine-tuner said of each of its moves, in order."""
     states = [message.data.split(":")[0] for message in story.of("/follower_1/alignment")]
     return [state for state in states if state in ("collect", "correct", "predict")]
 
 
 @pytest.fixture(scope="module")
-def closed():
+def closed() -> Story:
     return Story("seed=1000", close=True)
 
 
-def test_the_noise_floor_is_below_the_correction_of_previous_on_a_plane():
+def test_the_noise_floor_is_below_the_correction_of_previous_on_a_plane() -> None:
     settings = ("leader.timesteps=10",)
     for seed in (1000, 1001):
         previous, ideal, close = (
             run_task(Task("two", "plane", name, seed), settings) for name in ("previous", "ideal", "ideal+close")
         )
         assert {previous.outcome, ideal.outcome, close.outcome} == {"done"}
-        assert ideal.correction_m < previous.correction_m
-        assert close.correction_m < previous.correction_m
+        assert previous.correction_m is not None
+        for oracle in (ideal, close):
+            assert oracle.correction_m is not None
+            assert oracle.correction_m < previous.correction_m
 
 
-def test_only_prediction_moves_from_timestep_4_on_are_replaced(closed):
+def test_only_prediction_moves_from_timestep_4_on_are_replaced(closed: Story) -> None:
     plain = []
     InProcessRun(closed.scenario, listen=lambda *entry: plain.append(entry)).run()
     own = [conversions.read_move(message) for message in closed.of("/follower_1/move")]
@@ -151,7 +161,7 @@ def test_only_prediction_moves_from_timestep_4_on_are_replaced(closed):
 
 
 @pytest.mark.parametrize("surface", ["plane", "bowl"])
-def test_a_move_ends_where_the_camera_would_show_no_offset(surface):
+def test_a_move_ends_where_the_camera_would_show_no_offset(surface: str) -> None:
     story = Story("seed=1000", close=False, surface=surface)
     assert story.code == 0
     world = story.scenario.world
@@ -179,7 +189,7 @@ def test_a_move_ends_where_the_camera_would_show_no_offset(surface):
     assert checked == TIMESTEPS - 3
 
 
-def test_the_predictor_is_told_of_the_move_that_was_commanded(closed):
+def test_the_predictor_is_told_of_the_move_that_was_commanded(closed: Story) -> None:
     last, misses = {}, []
     for topic, message in closed.messages:
         name = topic.removeprefix("/follower_1/")
@@ -198,8 +208,8 @@ def test_the_predictor_is_told_of_the_move_that_was_commanded(closed):
     assert np.abs(misses).max() > 1e-3
 
 
-def test_the_actuation_bias_is_taken_off_the_closed_floors_moves(monkeypatch):
-    def first_prediction_move(close):
+def test_the_actuation_bias_is_taken_off_the_closed_floors_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    def first_prediction_move(close: bool) -> Motion:
         story = Story("seed=1000", "leader.timesteps=4", close=close)
         return conversions.read_move(story.of("/follower_1/move")[moves_of(story).index("predict")])
 

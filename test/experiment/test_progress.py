@@ -3,17 +3,20 @@
 import random
 import re
 from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from graph_tools import short_scenario
+from repository import ROOT
 from robot_formation import conversions, names
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.quantities import analyse
 from robot_formation.bag.reader import read_bag
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.progress import Progress
-from robot_formation.paths import project_root
 
 pytestmark = pytest.mark.slow
 
@@ -25,15 +28,15 @@ SAMPLES = ("track_one_formation", "track_one_previous", "track_two_measured")
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Bags of runs by name: samples of one follower, and a new one of two."""
     bag = tmp_path_factory.mktemp("progress") / "two_followers"
     result = run_in_process(short_scenario("followers=2", track="one"), bag, {"timesteps": "4"})
     assert result.exit_code == 0
-    return {bag.name: bag, **{name: project_root() / "bags" / "samples" / name for name in SAMPLES}}
+    return {bag.name: bag, **{name: ROOT / "bags" / "samples" / name for name in SAMPLES}}
 
 
-def messages_of(bag, progress):
+def messages_of(bag: Path, progress: Progress) -> dict[str, list[Any]]:
     """The messages that are followed, by topic, in the order in which they were sent."""
     found = defaultdict(list)
     with read_bag(bag) as opened:
@@ -42,29 +45,30 @@ def messages_of(bag, progress):
     return found
 
 
-def table_of(bag):
+def table_of(bag: Path) -> dict[tuple[str, int], tuple[str, str]]:
     """What the analysis says: (robot, t) to correction and formation error, both as a line shows them."""
     analysis = analyse(load_run(bag))
-    return {
-        (follower.name, row.t): (
-            f"{(row.corrections.u_m + row.corrections.v_m) * 100:.1f}",
-            f"{row.formation_error_m * 100:.2f}",
-        )
-        for follower in analysis.followers
-        for row in follower.timesteps
-    }
+    found = {}
+    for follower in analysis.followers:
+        for row in follower.timesteps:
+            assert row.formation_error_m is not None
+            correction_m = row.corrections.u_m + row.corrections.v_m
+            found[follower.name, row.t] = (f"{correction_m * 100:.1f}", f"{row.formation_error_m * 100:.2f}")
+    return found
 
 
-def told(messages, followers, timesteps, order):
+def told(
+    messages: dict[str, list[Any]], followers: int, timesteps: int, order: Sequence[str]
+) -> list[tuple[tuple[str, int], tuple[str, str]]]:
     """The lines, parsed, when topics give their next messages in a given order."""
-    lines = []
+    lines: list[str] = []
     progress = Progress(followers, timesteps, lines.append, lambda: 0.0)
     queues = {topic: iter(group) for topic, group in messages.items()}
     for topic in order:
         progress.listen(topic, next(queues[topic]))
     assert progress.complete
-    matches = [LINE.fullmatch(line) for line in lines]
-    assert all(matches)
+    matches = [match for line in lines if (match := LINE.fullmatch(line))]
+    assert len(matches) == len(lines)
     assert {match["n"] for match in matches} == {str(timesteps)}
     rows = [
         ((match["robot"] or "follower_1", int(match["t"])), (match["correction"], match["error"])) for match in matches
@@ -73,7 +77,7 @@ def told(messages, followers, timesteps, order):
     return rows
 
 
-def held_back(topics, order, late, count):
+def held_back(topics: Iterable[str], order: Sequence[str], late: str, count: int) -> list[str]:
     """An order in which a topic's messages always come so many messages later."""
     result, waiting = [], []
     for topic in order:
@@ -87,7 +91,7 @@ def held_back(topics, order, late, count):
 
 
 @pytest.mark.parametrize("name", ["two_followers", *SAMPLES])
-def test_every_line_says_what_the_table_says_in_any_order_of_the_topics(runs, name):
+def test_every_line_says_what_the_table_says_in_any_order_of_the_topics(runs: dict[str, Path], name: str) -> None:
     bag = runs[name]
     expected = table_of(bag)
     followers, timesteps = len({robot for robot, _ in expected}), max(t for _, t in expected)
@@ -109,14 +113,14 @@ def test_every_line_says_what_the_table_says_in_any_order_of_the_topics(runs, na
         assert dict(told(messages, followers, timesteps, order)) == expected
 
 
-def test_the_timesteps_of_a_follower_are_told_in_order(runs):
+def test_the_timesteps_of_a_follower_are_told_in_order(runs: dict[str, Path]) -> None:
     bag = runs["track_one_previous"]
     messages = messages_of(bag, Progress(1, 15, print, lambda: 0.0))
     order = [topic for topic, group in messages.items() for _ in group]
     assert [t for (_, t), _ in told(messages, 1, 15, order)] == list(range(1, 16))
 
 
-def test_a_move_that_could_not_be_measured_does_not_silence_the_run(runs):
+def test_a_move_that_could_not_be_measured_does_not_silence_the_run(runs: dict[str, Path]) -> None:
     bag = runs["track_one_previous"]
     progress = Progress(1, 15, print, lambda: 0.0)
     messages = messages_of(bag, progress)
@@ -130,8 +134,8 @@ def test_a_move_that_could_not_be_measured_does_not_silence_the_run(runs):
     assert dict(told(messages, 1, 15, order)) == table_of(bag)
 
 
-def test_a_reminder_says_where_each_follower_is():
-    lines = []
+def test_a_reminder_says_where_each_follower_is() -> None:
+    lines: list[str] = []
     progress = Progress(1, 15, lines.append, lambda: 3.0)
     progress.remind()
     for state in ("predict", "correct: far"):

@@ -1,6 +1,9 @@
 """A recorded run gives the same answers again, and other parameters show what would have changed."""
 
 import json
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,7 +27,7 @@ TIMESTEPS = 6
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The bag of a short run with pictures."""
     bag = tmp_path_factory.mktemp("replay") / "run"
     settings = ["seed=3", f"leader.timesteps={TIMESTEPS}", "world.camera.mode=on_demand", "predictor.forgetting=0.9"]
@@ -35,7 +38,7 @@ def run(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def formation_run(tmp_path_factory):
+def formation_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The bag of a short run with a predictor that uses everything it can hear, and keeps its state."""
     folder = tmp_path_factory.mktemp("replay")
     settings = ["seed=3", f"leader.timesteps={TIMESTEPS}", "world.camera.mode=on_demand", "predictor.name=formation"]
@@ -46,12 +49,12 @@ def formation_run(tmp_path_factory):
 
 
 @pytest.fixture
-def recording(run):
+def recording(run: Path) -> Iterator[Recording]:
     with read_bag(run) as bag:
         yield Recording(bag)
 
 
-def copied(run, target, *, without=(), details=None):
+def copied(run: Path, target: Path, *, without: Collection[str] = (), details: dict[str, str] | None = None) -> Path:
     """A copy of a bag that lacks some topics, or whose metadata say something else."""
     with read_bag(run) as bag, BagWriter(target) as writer:
         writer.write_metadata(METADATA_NAME, bag.metadata(METADATA_NAME) if details is None else details)
@@ -64,7 +67,9 @@ def copied(run, target, *, without=(), details=None):
 
 
 @pytest.mark.parametrize("replay", [replay_predictor, replay_fine_tuner, replay_detector])
-def test_the_same_parameters_give_the_same_answers(recording, replay):
+def test_the_same_parameters_give_the_same_answers(
+    recording: Recording, replay: Callable[[Recording, dict[str, Any]], list[Any]]
+) -> None:
     (found,) = replay(recording, {})
     assert found.robot == "follower_1"
     assert found.identical
@@ -72,14 +77,16 @@ def test_the_same_parameters_give_the_same_answers(recording, replay):
     assert len(found.rows) >= TIMESTEPS
 
 
-def test_a_precise_alignment_decides_as_it_did(formation_run):
+def test_a_precise_alignment_decides_as_it_did(formation_run: Path) -> None:
     with read_bag(formation_run) as bag:
         (found,) = replay_fine_tuner(Recording(bag), {})
     assert found.identical
     assert any(row.recorded.corrections for row in found.rows)
 
 
-def test_a_predictor_gets_what_was_commanded_too_and_its_state_file_is_left_alone(formation_run, tmp_path):
+def test_a_predictor_gets_what_was_commanded_too_and_its_state_file_is_left_alone(
+    formation_run: Path, tmp_path: Path
+) -> None:
     state = formation_run.parent / "follower_1.json"
     before = state.read_bytes()
     with read_bag(formation_run) as bag:
@@ -94,7 +101,7 @@ def test_a_predictor_gets_what_was_commanded_too_and_its_state_file_is_left_alon
     assert deaf.changed > 0
 
 
-def test_a_replay_goes_on_from_a_state_file_if_told(formation_run):
+def test_a_replay_goes_on_from_a_state_file_if_told(formation_run: Path) -> None:
     state = str(formation_run.parent / "{robot}.json")
     with read_bag(formation_run) as bag:
         (found,) = replay_predictor(Recording(bag), {"state_file": state, "load_state": True})
@@ -103,12 +110,14 @@ def test_a_replay_goes_on_from_a_state_file_if_told(formation_run):
 
 
 @pytest.mark.parametrize("replay", [replay_predictor, replay_fine_tuner])
-def test_a_replay_gives_the_same_twice(recording, replay):
+def test_a_replay_gives_the_same_twice(
+    recording: Recording, replay: Callable[[Recording, dict[str, Any]], list[Any]]
+) -> None:
     changes = {"name": "previous"} if replay is replay_predictor else {"alignment.v_tolerance_px": 12.0}
     assert replay(recording, changes) == replay(recording, changes)
 
 
-def test_the_previous_displacement_is_what_that_predictor_would_have_said(recording, run):
+def test_the_previous_displacement_is_what_that_predictor_would_have_said(recording: Recording, run: Path) -> None:
     from robot_formation.analysis.from_bag import load_run
 
     (found,) = replay_predictor(recording, {"name": "previous"})
@@ -116,6 +125,7 @@ def test_the_previous_displacement_is_what_that_predictor_would_have_said(record
     assert len(found.rows) == TIMESTEPS
     assert found.rows[0].today is None
     for row, before in zip(found.rows[1:], moved, strict=False):
+        assert row.today is not None
         assert (row.today.x_m, row.today.y_m) == pytest.approx((before.x_m, before.y_m))
     assert not found.identical
     # Until two pairs are known, 'measured' repeats the previous displacement too.
@@ -123,17 +133,18 @@ def test_the_previous_displacement_is_what_that_predictor_would_have_said(record
     assert found.rmse_m("recorded") != found.rmse_m("today")
 
 
-def test_the_ideal_move_is_displacement_and_residual_together(recording, run):
+def test_the_ideal_move_is_displacement_and_residual_together(recording: Recording, run: Path) -> None:
     from robot_formation.analysis.from_bag import load_run
 
     follower = load_run(run).followers[0]
     (found,) = replay_predictor(recording, {})
     for row, moved, left in zip(found.rows, follower.displacements, follower.residuals, strict=True):
+        assert row.ideal is not None
         assert row.ideal.u_m == pytest.approx(moved.motion.u_m + left.motion.u_m)
         assert row.ideal.v_m == pytest.approx(moved.motion.v_m + left.motion.v_m)
 
 
-def test_a_wider_tolerance_asks_for_fewer_corrections(recording):
+def test_a_wider_tolerance_asks_for_fewer_corrections(recording: Recording) -> None:
     (found,) = replay_fine_tuner(recording, {"alignment.v_tolerance_px": 30.0, "alignment.u_tolerance_m": 0.1})
     assert found.changed > 0
     assert not any(row.beyond for row in found.rows)
@@ -141,7 +152,7 @@ def test_a_wider_tolerance_asks_for_fewer_corrections(recording):
     assert {row.today.outcome for row in found.rows} == {"aligned"}
 
 
-def test_a_narrower_tolerance_asks_for_one_correction_that_nothing_recorded_answers(recording):
+def test_a_narrower_tolerance_asks_for_one_correction_that_nothing_recorded_answers(recording: Recording) -> None:
     (found,) = replay_fine_tuner(recording, {"alignment.v_tolerance_px": 0.0, "alignment.u_tolerance_m": 0.0})
     beyond = [row for row in found.rows if row.beyond]
     assert beyond
@@ -151,12 +162,12 @@ def test_a_narrower_tolerance_asks_for_one_correction_that_nothing_recorded_answ
     assert not [note for note in recording.notes if "not aligned" in note]
 
 
-def test_another_signature_filter_changes_blocks(recording):
+def test_another_signature_filter_changes_blocks(recording: Recording) -> None:
     (found,) = replay_detector(recording, {"min_block_area": 2000})
     assert 0 < found.changed <= len(found.rows)
 
 
-def test_unknown_changes_and_missing_topics_are_told(run, recording, tmp_path):
+def test_unknown_changes_and_missing_topics_are_told(run: Path, recording: Recording, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="no parameter 'forgeting'; did you mean 'forgetting'"):
         replay_predictor(recording, {"forgeting": 0.5})
     bag = copied(run, tmp_path / "bag", without=("/follower_1/camera/image_raw", "/follower_1/residual"))
@@ -168,7 +179,7 @@ def test_unknown_changes_and_missing_topics_are_told(run, recording, tmp_path):
             replay_predictor(poor, {})
 
 
-def test_other_versions_and_parameters_that_are_gone_are_noted(run, tmp_path):
+def test_other_versions_and_parameters_that_are_gone_are_noted(run: Path, tmp_path: Path) -> None:
     parameters = {"predictor": {"name": "previous", "magic": 3}}
     details = {"parameters": json.dumps(parameters), "versions": json.dumps({"numpy": "0.1"}), "git_commit": "abc"}
     with read_bag(copied(run, tmp_path / "bag", details=details)) as opened:
@@ -180,14 +191,14 @@ def test_other_versions_and_parameters_that_are_gone_are_noted(run, tmp_path):
         assert words in text
 
 
-def test_a_bag_without_parameters_is_replayed_with_those_of_config(formation_run, tmp_path):
+def test_a_bag_without_parameters_is_replayed_with_those_of_config(formation_run: Path, tmp_path: Path) -> None:
     with read_bag(copied(formation_run, tmp_path / "bag", details={})) as opened:
         bare = Recording(opened)
         assert replay_fine_tuner(bare, {})[0].identical
     assert "those of config/ are taken" in bare.notes[0]
 
 
-def test_a_bag_of_something_else_is_refused(tmp_path):
+def test_a_bag_of_something_else_is_refused(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as writer:
         writer.add_topic("/words", "std_msgs/msg/String", TopicQos())
         writer.write("/words", bytes([0, 1, 0, 0, 1, 0, 0, 0, 0]), 0)
@@ -207,7 +218,9 @@ def test_a_bag_of_something_else_is_refused(tmp_path):
         (["--images", "--set", "block_detector.min_block_area=2000"], False),
     ],
 )
-def test_the_verb_prints_tables_and_json(run, capsys, arguments, identical):
+def test_the_verb_prints_tables_and_json(
+    run: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], identical: bool
+) -> None:
     assert main(["replay", str(run), *arguments]) == 0
     said = capsys.readouterr().out
     assert said.strip().splitlines()[-1].startswith("identical to the recording" if identical else "changed in")
@@ -226,7 +239,9 @@ def test_the_verb_prints_tables_and_json(run, capsys, arguments, identical):
         (["--set", "predictor.forgetting=2"], "outside"),
     ],
 )
-def test_what_cannot_be_replayed_is_one_line(run, capsys, arguments, words):
+def test_what_cannot_be_replayed_is_one_line(
+    run: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
     assert main(["replay", str(run), *arguments]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert words in line

@@ -3,6 +3,8 @@
 import csv
 import json
 from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -12,21 +14,22 @@ from robot_formation.cli.sweep import seeds
 from robot_formation.errors import FormationError
 from robot_formation.experiment import sweep
 from robot_formation.experiment.sweep import Plan, Row, SweepError, Table, Task
+from robot_formation.koopman.predictors import NAMES
 
 SHORT = ("leader.timesteps=4",)
 PLAN = Plan(("two",), ("plane",), ("previous", "ideal+close"), (1000, 1001), SHORT)
 NUMBERS = [field.name for field in fields(Row)][6:]
 
 
-def row_of(task, correction_m=0.1):
+def row_of(task: Task, correction_m: float = 0.1) -> Row:
     return Row(*task, "done", 15, correction_m, *[0.25] * (len(NUMBERS) - 1))
 
 
-def lines_of(folder):
+def lines_of(folder: Path) -> list[bytes]:
     return (folder / "runs.csv").read_bytes().splitlines(keepends=True)
 
 
-def filled(folder, plan=PLAN, count=4):
+def filled(folder: Path, plan: Plan = PLAN, count: int = 4) -> Table:
     """A table with the first rows of a plan."""
     table = Table(folder, plan)
     for number, task in zip(range(count), plan.tasks(), strict=False):
@@ -37,8 +40,8 @@ def filled(folder, plan=PLAN, count=4):
 # --- plans ------------------------------------------------------------------------------------------------------------
 
 
-def test_a_plan_that_can_be_run_passes_with_every_predictor_and_the_noise_floors():
-    Plan(("one", "two"), ("bowl", "ripple"), (*sweep.NAMES, "ideal", "ideal+close"), (0,)).check()
+def test_a_plan_that_can_be_run_passes_with_every_predictor_and_the_noise_floors() -> None:
+    Plan(("one", "two"), ("bowl", "ripple"), (*NAMES, "ideal", "ideal+close"), (0,)).check()
 
 
 @pytest.mark.parametrize(
@@ -63,7 +66,7 @@ def test_a_plan_that_can_be_run_passes_with_every_predictor_and_the_noise_floors
         ({"settings": ("leader.timesteps",)}, ["KEY=VALUE"]),
     ],
 )
-def test_a_wrong_plan_is_refused_with_one_line_that_names_the_mistake(change, words):
+def test_a_wrong_plan_is_refused_with_one_line_that_names_the_mistake(change: dict[str, Any], words: list[str]) -> None:
     with pytest.raises(FormationError) as caught:
         replace(PLAN, **change).check()
     assert "\n" not in str(caught.value)
@@ -71,7 +74,7 @@ def test_a_wrong_plan_is_refused_with_one_line_that_names_the_mistake(change, wo
         assert word in str(caught.value)
 
 
-def test_tasks_are_every_combination_once_and_all_of_a_seed_together():
+def test_tasks_are_every_combination_once_and_all_of_a_seed_together() -> None:
     plan = Plan(("one", "two"), ("bowl", "plane"), ("previous", "ewma"), (3, 1))
     tasks = list(plan.tasks())
     assert len(set(tasks)) == len(tasks) == 16
@@ -79,7 +82,7 @@ def test_tasks_are_every_combination_once_and_all_of_a_seed_together():
     assert [task.predictor for task in tasks] == ["previous", "ewma"] * 8
 
 
-def test_a_runs_conditions_are_the_papers_fine_tuner_and_pictures_on_demand():
+def test_a_runs_conditions_are_the_papers_fine_tuner_and_pictures_on_demand() -> None:
     scenario = sweep.build(Task("two", "ripple", "ewma+close", 7), ("predictor.ewma.gain=0.3",))
     assert scenario.setup.seed == 7
     assert scenario.world.surface == "ripple"
@@ -100,14 +103,14 @@ def test_a_runs_conditions_are_the_papers_fine_tuner_and_pictures_on_demand():
         ("09:11", (9, 10)),
     ],
 )
-def test_seeds_are_first_to_before_the_end_or_one(text, expected):
+def test_seeds_are_first_to_before_the_end_or_one(text: str, expected: tuple[int, ...]) -> None:
     assert seeds(text) == expected
 
 
 @pytest.mark.parametrize(
     "text", ["", ":", "3:", ":3", "3:3", "4:2", "-1:3", "0:2:1", "a:b", "1.5", "0, 1", "0:9999999", "9" * 30, "0:3\n"]
 )
-def test_other_seeds_are_refused_with_one_line(text):
+def test_other_seeds_are_refused_with_one_line(text: str) -> None:
     with pytest.raises(FormationError, match="--seeds"):
         seeds(text)
 
@@ -129,14 +132,14 @@ number = st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False))
         **dict.fromkeys(NUMBERS, number),
     )
 )
-def test_a_row_survives_the_table_to_the_last_bit(tmp_path_factory, row):
+def test_a_row_survives_the_table_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, row: Row) -> None:
     folder = tmp_path_factory.mktemp("sweep")
     Table(folder, PLAN).add(row)
     (found,) = sweep.read_rows(folder / "runs.csv")
     assert repr(found) == repr(row)
 
 
-def test_the_table_is_a_csv_file_with_the_names_of_the_quantities(tmp_path):
+def test_the_table_is_a_csv_file_with_the_names_of_the_quantities(tmp_path: Path) -> None:
     filled(tmp_path / "out")
     with (tmp_path / "out" / "runs.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -145,7 +148,7 @@ def test_the_table_is_a_csv_file_with_the_names_of_the_quantities(tmp_path):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["runs.csv", "sweep.json"]
 
 
-def test_opening_a_table_again_keeps_it_byte_for_byte(tmp_path):
+def test_opening_a_table_again_keeps_it_byte_for_byte(tmp_path: Path) -> None:
     rows = dict(filled(tmp_path / "out").rows)
     before = lines_of(tmp_path / "out")
     assert Table(tmp_path / "out", PLAN).rows == rows
@@ -153,7 +156,7 @@ def test_opening_a_table_again_keeps_it_byte_for_byte(tmp_path):
 
 
 @pytest.mark.parametrize("kept", [1, 20, -12, -2, -1])
-def test_a_last_line_that_was_cut_off_is_no_row_and_is_run_again(tmp_path, kept):
+def test_a_last_line_that_was_cut_off_is_no_row_and_is_run_again(tmp_path: Path, kept: int) -> None:
     filled(tmp_path)
     before = lines_of(tmp_path)
     (tmp_path / "runs.csv").write_bytes(b"".join(before[:-1]) + before[-1][:kept])
@@ -169,7 +172,7 @@ def test_a_last_line_that_was_cut_off_is_no_row_and_is_run_again(tmp_path, kept)
     "line",
     ["two,plane", "two,plane,previous,x" + ",1" * 11, "two,plane,previous,3,done,4,nan" + ",1" * 7, "\0", "a\rb"],
 )
-def test_a_damaged_line_is_named(tmp_path, line):
+def test_a_damaged_line_is_named(tmp_path: Path, line: str) -> None:
     filled(tmp_path, count=2)
     with (tmp_path / "runs.csv").open("ab") as file:
         file.write(line.encode() + b"\r\n")
@@ -178,7 +181,7 @@ def test_a_damaged_line_is_named(tmp_path, line):
 
 
 @pytest.mark.parametrize("content", [b"", b"name,value\n1,2\n", b"\xff\xfe\x00", b"track,surface"])
-def test_another_file_in_the_tables_place_is_refused_and_kept(tmp_path, content):
+def test_another_file_in_the_tables_place_is_refused_and_kept(tmp_path: Path, content: bytes) -> None:
     filled(tmp_path)
     (tmp_path / "runs.csv").write_bytes(content)
     with pytest.raises(SweepError, match=r"runs\.csv: "):
@@ -186,7 +189,7 @@ def test_another_file_in_the_tables_place_is_refused_and_kept(tmp_path, content)
     assert (tmp_path / "runs.csv").read_bytes() == content
 
 
-def test_a_folder_with_something_else_is_refused_and_left_alone(tmp_path):
+def test_a_folder_with_something_else_is_refused_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("years of work")
     with pytest.raises(SweepError, match="is not empty and holds no sweep; choose another --out"):
         Table(tmp_path, PLAN)
@@ -194,14 +197,14 @@ def test_a_folder_with_something_else_is_refused_and_left_alone(tmp_path):
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"settings": 5}', "\0"])
-def test_a_damaged_record_of_a_sweep_is_refused(tmp_path, content):
+def test_a_damaged_record_of_a_sweep_is_refused(tmp_path: Path, content: str) -> None:
     filled(tmp_path)
     (tmp_path / "sweep.json").write_text(content)
     with pytest.raises(SweepError, match=r"sweep\.json: no record of a sweep"):
         Table(tmp_path, PLAN)
 
 
-def test_a_sweep_with_other_settings_is_refused_and_kept(tmp_path):
+def test_a_sweep_with_other_settings_is_refused_and_kept(tmp_path: Path) -> None:
     filled(tmp_path)
     before = lines_of(tmp_path)
     other = replace(PLAN, settings=("leader.timesteps=5",))
@@ -211,7 +214,7 @@ def test_a_sweep_with_other_settings_is_refused_and_kept(tmp_path):
     assert json.loads((tmp_path / "sweep.json").read_text())["settings"] == list(SHORT)
 
 
-def test_more_seeds_and_predictors_go_on_in_the_same_folder(tmp_path):
+def test_more_seeds_and_predictors_go_on_in_the_same_folder(tmp_path: Path) -> None:
     filled(tmp_path)
     wider = replace(PLAN, predictors=("ewma", "previous"), seeds=(1001, 1002))
     table = Table(tmp_path, wider)
@@ -227,11 +230,11 @@ def test_more_seeds_and_predictors_go_on_in_the_same_folder(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def one_job():
+def one_job() -> dict[Task, Row]:
     return {row.task: row for row in sweep.carry_out(PLAN.tasks(), SHORT, 1)}
 
 
-def test_every_task_yields_its_row(one_job):
+def test_every_task_yields_its_row(one_job: dict[Task, Row]) -> None:
     assert set(one_job) == set(PLAN.tasks())
     for row in one_job.values():
         assert (row.outcome, row.timesteps, row.lost) == ("done", 4, False)
@@ -239,13 +242,15 @@ def test_every_task_yields_its_row(one_job):
     assert len({row.formation_error_rmse_m for row in one_job.values()}) == 4
 
 
-def test_the_rows_do_not_depend_on_the_number_of_jobs_nor_on_the_order(one_job):
+def test_the_rows_do_not_depend_on_the_number_of_jobs_nor_on_the_order(one_job: dict[Task, Row]) -> None:
     tasks = list(PLAN.tasks())[::-1]
     two_jobs = {row.task: row for row in sweep.carry_out(tasks, SHORT, 2)}
     assert {task: repr(row) for task, row in two_jobs.items()} == {task: repr(row) for task, row in one_job.items()}
 
 
-def test_a_resumed_sweep_has_the_same_table_byte_for_byte_and_runs_only_what_is_missing(tmp_path, one_job):
+def test_a_resumed_sweep_has_the_same_table_byte_for_byte_and_runs_only_what_is_missing(
+    tmp_path: Path, one_job: dict[Task, Row]
+) -> None:
     whole = Table(tmp_path / "whole", PLAN)
     for task in PLAN.tasks():
         whole.add(one_job[task])
@@ -261,13 +266,13 @@ def test_a_resumed_sweep_has_the_same_table_byte_for_byte_and_runs_only_what_is_
     assert sweep.remaining(PLAN, table.rows) == []
 
 
-def test_a_lost_run_is_a_row_too():
+def test_a_lost_run_is_a_row_too() -> None:
     row = sweep.run_task(Task("two", "plane", "previous", 1000), (*SHORT, "world.camera.pan_deg=-90"))
     assert (row.outcome, row.lost, row.timesteps, row.correction_m) == ("lost", True, 0, None)
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_a_run_that_stands_still_is_named(jobs):
+def test_a_run_that_stands_still_is_named(jobs: int) -> None:
     task = Task("two", "plane", "previous", 1000)
     words = "track two, surface plane, predictor previous, seed 1000: .*everybody waits"
     with pytest.raises(SweepError, match=words):

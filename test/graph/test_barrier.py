@@ -1,6 +1,8 @@
 """The live graph: who listens to what, and who calls whom."""
 
 import threading
+from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 import rclpy
@@ -19,20 +21,20 @@ FOLLOWER_NODES = ("drive", "block_detector", "predictor", "fine_tuner")
 class Witness:
     """Reads the graph of a run while it goes on, from a hidden node of its own."""
 
-    def __init__(self, robots, monkeypatch):
+    def __init__(self, robots: Sequence[str], monkeypatch: pytest.MonkeyPatch) -> None:
         self._robots = robots
         self._monkeypatch = monkeypatch
-        self.subscriptions = {}
-        self.clients = {}
-        self.publishers = {}
+        self.subscriptions: dict[tuple[str, str], set[str]] = {}
+        self.clients: dict[tuple[str, str], set[str]] = {}
+        self.publishers: dict[tuple[str, str], set[str]] = {}
         self._stop = threading.Event()
 
-    def started(self, domain, pids):
+    def started(self, domain: int, pids: dict[str, int]) -> None:
         self._monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         self._thread = threading.Thread(target=self._watch, args=(domain,))
         self._thread.start()
 
-    def _watch(self, domain):
+    def _watch(self, domain: int) -> None:
         context = Context()
         rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
         node = Node("_witness", context=context, enable_rosout=False, start_parameter_services=False)
@@ -53,13 +55,15 @@ class Witness:
         node.destroy_node()
         rclpy.shutdown(context=context)
 
-    def finish(self):
+    def finish(self) -> None:
         self._stop.set()
         self._thread.join()
 
 
 @pytest.mark.parametrize("followers", [1, 2])
-def test_a_follower_hears_nothing_but_itself_and_its_neighbours_tick(tmp_path, monkeypatch, followers):
+def test_a_follower_hears_nothing_but_itself_and_its_neighbours_tick(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, followers: int
+) -> None:
     scenario = short_scenario(f"followers={followers}", "leader.timesteps=3", track="one")
     witness = Witness(scenario.robots, monkeypatch)
     result = launch(scenario, tmp_path / "bag", on_start=witness.started)
@@ -79,7 +83,7 @@ def test_a_follower_hears_nothing_but_itself_and_its_neighbours_tick(tmp_path, m
         assert heard_neighbour, "the whitelist would hold for a deaf follower too"
 
 
-def test_the_witness_would_see_a_breach(tmp_path, monkeypatch):
+def test_the_witness_would_see_a_breach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The world listens outside any robot's namespace: what the barrier's test looks for can be seen."""
     scenario = short_scenario("leader.timesteps=8")
     witness = Witness(scenario.robots, monkeypatch)

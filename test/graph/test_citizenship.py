@@ -2,20 +2,24 @@
 
 import os
 import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 import rclpy
 import yaml
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
-from rclpy.qos import QoSDurabilityPolicy, QoSReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from graph_lab import Lab, open_lab
 from robot_formation import names
 from robot_formation.bag.writer import BagWriter
-from robot_formation.components.base import Place
+from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
-from robot_formation.names import absolute
+from robot_formation.names import Qos, absolute
 from robot_formation.parameters import from_mapping
 from synthetic_bag import SyntheticRun
 
@@ -35,11 +39,11 @@ OF_ROS = {"/diagnostics", "/parameter_events", "/rosout"}
 NEVER = 3600.0
 
 
-def full_name(node):
+def full_name(node: str) -> str:
     return f"{NAMESPACES[node]}/{node}"
 
 
-def options_of(node, folder):
+def options_of(node: str, folder: Path) -> list[str]:
     """What a node is started with: the ticks' namespace, and what it can't start without."""
     own = {
         "leader": ["followers:=[follower_9]"],  # nobody: the run never begins
@@ -53,15 +57,15 @@ def options_of(node, folder):
 class Site(Lab):
     """All nodes under a namespace of their own, the drive and the player with remappings."""
 
-    def __init__(self, domain, folder):
+    def __init__(self, domain: int, folder: Path) -> None:
         super().__init__(domain, folder)
         self.folder = folder
-        self.running = {}
-        self.clients = {}
+        self.running: dict[str, subprocess.Popen[str]] = {}
+        self.clients: dict[str, AsyncParameterClient] = {}
         with BagWriter(folder / "source") as writer:
             SyntheticRun(writer)
 
-    def start_all(self, options):
+    def start_all(self, options: Callable[[str], list[str]]) -> None:
         remaps = {"drive": "moved:=displaced", "player": "/follower_1/moved:=played/moved"}
         for node, namespace in NAMESPACES.items():
             remap = ["-r", remaps[node]] if node in remaps else []
@@ -69,7 +73,7 @@ class Site(Lab):
         wanted = set(NAMESPACES.items())
         self.until(lambda: wanted <= set(self.node.get_node_names_and_namespaces()))
 
-    def interrupt_all(self):
+    def interrupt_all(self) -> dict[str, int]:
         """Ctrl-C in the terminal of each node: the signal goes to its whole process group, and launch repeats it."""
         for process in self.running.values():
             os.killpg(process.pid, signal.SIGINT)
@@ -83,27 +87,27 @@ class Site(Lab):
         self.clients.clear()
         return ended
 
-    def endpoint(self, find, topic, node):
+    def endpoint(self, find: Callable[[str], list[Any]], topic: str, node: str) -> Any:
         """The one publisher or subscription that a node has on a topic, when it has been discovered."""
 
-        def found():
+        def found() -> list[Any]:
             return [info for info in find(topic) if info.node_name == node]
 
         self.until(found)
         (info,) = found()
         return info
 
-    def client(self, node):
+    def client(self, node: str) -> AsyncParameterClient:
         if node not in self.clients:
             self.clients[node] = AsyncParameterClient(self.node, full_name(node))
             self.until(self.clients[node].services_are_ready)
         return self.clients[node]
 
-    def answer(self, future):
+    def answer(self, future: Any) -> Any:
         self.until(future.done)
         return future.result()
 
-    def parameters(self, node):
+    def parameters(self, node: str) -> dict[str, Any]:
         """All of a node's parameters, as `ros2 param dump` gets them."""
         client = self.client(node)
         listed = self.answer(client.list_parameters()).result.names
@@ -111,20 +115,20 @@ class Site(Lab):
         plain = [parameter_value_to_python(value) for value in values]
         return {n: v.tolist() if hasattr(v, "tolist") else v for n, v in zip(listed, plain, strict=True)}
 
-    def set(self, node, name, value):
+    def set(self, node: str, name: str, value: Any) -> Any:
         """What `ros2 param set` does."""
         (result,) = self.answer(self.client(node).set_parameters([as_typed(name, value)])).results
         return result
 
 
-def as_typed(name, value):
+def as_typed(name: str, value: Any) -> Parameter:
     """A value with the type that ROS's command line sees in it: an empty list is one of bool."""
     return Parameter(name, Parameter.Type.BOOL_ARRAY, []) if value == [] else Parameter(name, value=value)
 
 
-def dump(node, parameters):
+def dump(node: str, parameters: dict[str, Any]) -> str:
     """The text that `ros2 param dump` prints: the full name as key, dotted names as nested mappings."""
-    nested = {}
+    nested: dict[str, Any] = {}
     for name, value in sorted(parameters.items()):
         *groups, last = name.split(".")
         inner = nested
@@ -136,21 +140,22 @@ def dump(node, parameters):
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory):
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     with open_lab(tmp_path_factory.mktemp("site"), Site) as made:
         made.start_all(lambda node: options_of(node, made.folder))
         yield made
 
 
-def component(kind):
+def component(kind: str) -> Component:
     entry = KINDS[kind]
     robot = NAMESPACES[kind].rpartition("/")[2] if entry.robots else ""
     values = {"followers": ["follower_9"]} if kind == "leader" else {}
     parameters = from_mapping(entry.parameter_class(), values, where=kind)
-    return entry.component_class()(parameters, Place(robot, TICKS))
+    made: Component = entry.component_class()(parameters, Place(robot, TICKS))
+    return made
 
 
-def topics_of(site, node):
+def topics_of(site: Site, node: str) -> set[str]:
     """Names of what a node publishes, subscribes to and serves."""
     inside = (node, NAMESPACES[node])
     return {
@@ -165,7 +170,7 @@ def topics_of(site, node):
     }
 
 
-def expected_names(node):
+def expected_names(node: str) -> set[str]:
     """What a node must be seen with, as far as it is known before: then the rest is there too."""
     if node == "recorder":
         return {f"{SITE}/follower_1/alignment"}
@@ -176,13 +181,13 @@ def expected_names(node):
 
 
 @pytest.mark.parametrize("node", [*KINDS, "recorder"])
-def test_a_nodes_names_lie_in_its_namespace_and_that_of_the_ticks(site, node):
+def test_a_nodes_names_lie_in_its_namespace_and_that_of_the_ticks(site: Site, node: str) -> None:
     site.until(lambda: expected_names(node) <= topics_of(site, node))
     found = topics_of(site, node) - OF_ROS
     assert {name for name in found if not name.startswith((f"{NAMESPACES[node]}/", f"{TICKS}/"))} == set()
 
 
-def test_users_remappings_count(site):
+def test_users_remappings_count(site: Site) -> None:
     moved = f"{SITE}/follower_1/moved"
     site.until(lambda: moved.replace("moved", "displaced") in topics_of(site, "drive"))
     assert moved not in topics_of(site, "drive")
@@ -190,20 +195,20 @@ def test_users_remappings_count(site):
     assert "/follower_1/moved" not in topics_of(site, "player")
 
 
-def qos_of(info):
+def qos_of(info: Any) -> tuple[ReliabilityPolicy, DurabilityPolicy]:
     profile = info.qos_profile
     return (profile.reliability, profile.durability)
 
 
-def expected(qos, durability=None):
+def expected(qos: Qos, durability: str | None = None) -> tuple[ReliabilityPolicy, DurabilityPolicy]:
     return (
-        QoSReliabilityPolicy[qos.reliability.upper()],
-        QoSDurabilityPolicy[(durability or qos.durability).upper()],
+        ReliabilityPolicy[qos.reliability.upper()],
+        DurabilityPolicy[(durability or qos.durability).upper()],
     )
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_topics_have_the_type_and_the_quality_of_service_of_the_nodes_page(site, kind):
+def test_topics_have_the_type_and_the_quality_of_service_of_the_nodes_page(site: Site, kind: str) -> None:
     built = component(kind)
     outputs = {absolute(NAMESPACES[kind], topic.name): topic for topic in [*built.outputs(), names.DIAGNOSTICS]}
     for name, topic in outputs.items():
@@ -240,7 +245,9 @@ def test_topics_have_the_type_and_the_quality_of_service_of_the_nodes_page(site,
         ("player", "bag", "other", "the playback was prepared with it"),
     ],
 )
-def test_parameters_are_set_or_refused_with_a_reason(site, node, name, value, says):
+def test_parameters_are_set_or_refused_with_a_reason(
+    site: Site, node: str, name: str, value: Any, says: str | None
+) -> None:
     # The follower aligns itself at its start: on a busy machine its drive may still be moving.
     site.until(lambda: "a move is under way" not in site.set(node, name, value).reason)
     result = site.set(node, name, value)
@@ -250,7 +257,7 @@ def test_parameters_are_set_or_refused_with_a_reason(site, node, name, value, sa
         assert site.parameters(node)[name] == value
 
 
-def test_a_parameter_is_set_by_its_former_name_too(site):
+def test_a_parameter_is_set_by_its_former_name_too(site: Site) -> None:
     today = site.parameters("predictor")["formation.initial_loss"]
     assert site.set("predictor", "formation.handicap", today).successful
     pair = [Parameter(f"formation.{name}", value=today) for name in ("handicap", "initial_loss")]
@@ -265,13 +272,13 @@ def test_a_parameter_is_set_by_its_former_name_too(site):
 
 
 @pytest.mark.parametrize("node", NAMESPACES)
-def test_param_load_takes_what_param_dump_gave(site, node):
+def test_param_load_takes_what_param_dump_gave(site: Site, node: str) -> None:
     parameters = [as_typed(name, value) for name, value in site.parameters(node).items()]
     results = site.answer(site.client(node).set_parameters(parameters)).results
     assert [result.reason for result in results if not result.successful] == []
 
 
-def test_ctrl_c_ends_every_node_cleanly_and_its_dumped_parameters_start_it_again_as_it_was(site):
+def test_ctrl_c_ends_every_node_cleanly_and_its_dumped_parameters_start_it_again_as_it_was(site: Site) -> None:
     before = {node: site.parameters(node) for node in NAMESPACES}
     for node, parameters in before.items():
         (site.folder / f"{node}.yaml").write_text(dump(node, parameters))
@@ -282,7 +289,7 @@ def test_ctrl_c_ends_every_node_cleanly_and_its_dumped_parameters_start_it_again
     assert site.interrupt_all() == dict.fromkeys(NAMESPACES, 0)
 
 
-def test_a_parameter_by_its_old_name_is_refused_with_the_new_one(lab):
+def test_a_parameter_by_its_old_name_is_refused_with_the_new_one(lab: Lab) -> None:
     for node in ("predictor", "drive"):
         process = lab.start(node, "-p", "formation:=/site/formation", namespace="/follower_1")
         _, errors = process.communicate(timeout=60)
@@ -290,7 +297,7 @@ def test_a_parameter_by_its_old_name_is_refused_with_the_new_one(lab):
         assert "no parameter 'formation'; it is called 'formation_namespace' now" in errors
 
 
-def test_a_parameter_by_its_former_name_too_is_refused(lab):
+def test_a_parameter_by_its_former_name_too_is_refused(lab: Lab) -> None:
     both = ["-p", "formation.handicap:=2.0", "-p", "formation.initial_loss:=1.0"]
     process = lab.start("predictor", *both, namespace="/follower_1")
     _, errors = process.communicate(timeout=60)
@@ -298,13 +305,13 @@ def test_a_parameter_by_its_former_name_too_is_refused(lab):
     assert "'formation.initial_loss' is given twice" in errors
 
 
-def test_a_best_effort_camera_is_heard_where_its_user_says_so(lab):
+def test_a_best_effort_camera_is_heard_where_its_user_says_so(lab: Lab) -> None:
     policy = "qos_overrides./follower_1/camera/image_raw.subscription.reliability"
     lab.start("block_detector", "-p", f"{policy}:=best_effort", namespace="/follower_1")
     topic = names.camera_image()
     lab.until(lambda: lab.node.get_subscriptions_info_by_topic(f"/follower_1/{topic.name}"))
     (info,) = lab.node.get_subscriptions_info_by_topic(f"/follower_1/{topic.name}")
-    assert info.qos_profile.reliability == QoSReliabilityPolicy.BEST_EFFORT
+    assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
 @pytest.mark.parametrize(
@@ -314,7 +321,7 @@ def test_a_best_effort_camera_is_heard_where_its_user_says_so(lab):
         ("qos_overrides./follower_1/image_raw.subscription.reliability", "best_effort"),
     ],
 )
-def test_a_quality_of_service_that_is_none_or_has_no_subscription_is_refused(lab, name, value):
+def test_a_quality_of_service_that_is_none_or_has_no_subscription_is_refused(lab: Lab, name: str, value: Any) -> None:
     process = lab.start("block_detector", "-p", f"{name}:={value}", namespace="/follower_1")
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 2

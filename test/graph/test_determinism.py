@@ -1,5 +1,7 @@
 """The same scenario and seed give the same run to the last bit, whatever the machine does meanwhile."""
 
+from pathlib import Path
+
 import pytest
 
 from graph_tools import BusyCores, displacements, launch, short_scenario
@@ -7,9 +9,11 @@ from robot_formation.experiment.in_process import run_in_process
 
 pytestmark = pytest.mark.graph
 
+Displacements = list[tuple[int, float, float, float]]  # stamp, x, y and yaw of each
+
 
 @pytest.fixture(scope="module")
-def in_process(tmp_path_factory):
+def in_process(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Displacements]:
     """Displacements of the in-process run by camera mode."""
     found = {}
     for mode in ("on_demand", "stream"):
@@ -22,13 +26,15 @@ def in_process(tmp_path_factory):
 
 
 @pytest.mark.parametrize("mode", ["on_demand", "stream"])
-def test_the_node_graph_gives_the_in_process_run(tmp_path, in_process, mode):
+def test_the_node_graph_gives_the_in_process_run(
+    tmp_path: Path, in_process: dict[str, Displacements], mode: str
+) -> None:
     result = launch(short_scenario(f"world.camera.mode={mode}"), tmp_path / "bag")
     assert (result.exit_code, result.reason) == (0, "")
     assert displacements(tmp_path / "bag") == in_process[mode]
 
 
-def test_loaded_cores_change_nothing(tmp_path, in_process):
+def test_loaded_cores_change_nothing(tmp_path: Path, in_process: dict[str, Displacements]) -> None:
     with BusyCores():
         result = launch(short_scenario(), tmp_path / "bag")
     assert result.exit_code == 0
@@ -36,13 +42,15 @@ def test_loaded_cores_change_nothing(tmp_path, in_process):
 
 
 @pytest.mark.parametrize(("mode", "timesteps"), [("on_demand", 4), ("stream", 2)])
-def test_random_delays_in_every_callback_change_nothing(tmp_path, in_process, mode, timesteps):
+def test_random_delays_in_every_callback_change_nothing(
+    tmp_path: Path, in_process: dict[str, Displacements], mode: str, timesteps: int
+) -> None:
     scenario = short_scenario(f"world.camera.mode={mode}", f"leader.timesteps={timesteps}")
     result = launch(scenario, tmp_path / "bag", callback_delay_s=0.05)
     assert result.exit_code == 0
     assert displacements(tmp_path / "bag") == in_process[mode][:timesteps]
 
 
-def test_another_seed_gives_another_run(tmp_path, in_process):
+def test_another_seed_gives_another_run(tmp_path: Path, in_process: dict[str, Displacements]) -> None:
     run_in_process(short_scenario(seed=4), tmp_path / "bag", {})
     assert displacements(tmp_path / "bag") != in_process["on_demand"]

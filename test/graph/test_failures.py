@@ -34,18 +34,18 @@ KILLED = ("/world", "/leader/drive", "/follower_1/fine_tuner", "/recorder")
 LONG = ("leader.timesteps=50",)
 
 
-def shared_memory_ports(domain):
+def shared_memory_ports(domain: int) -> list[str]:
     """Shared-memory files that belong to a domain's ports."""
     ports = {f"port{port}" for port in domain_ports(domain)}
     return [name for name in os.listdir("/dev/shm") if any(name.endswith(p) or f"{p}_" in name for p in ports)]
 
 
 @pytest.mark.parametrize("node", KILLED)
-def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path, node):
+def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path: Path, node: str) -> None:
     killer = Killer(node, signal.SIGKILL, after_timesteps=3)
     domains = []
 
-    def on_start(domain, pids):
+    def on_start(domain: int, pids: dict[str, int]) -> None:
         domains.append(domain)
         killer.started(domain, pids)
 
@@ -65,7 +65,7 @@ def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path, node):
 
 
 @pytest.mark.parametrize("node", ["/follower_1/predictor", "/recorder"])
-def test_a_stopped_node_ends_the_run_by_name_with_a_whole_bag(tmp_path, node):
+def test_a_stopped_node_ends_the_run_by_name_with_a_whole_bag(tmp_path: Path, node: str) -> None:
     killer = Killer(node, signal.SIGSTOP, after_timesteps=2)
     result = launch(short_scenario(*LONG), tmp_path / "bag", say=killer.say, on_start=killer.started)
     assert result.exit_code == 4
@@ -76,7 +76,7 @@ def test_a_stopped_node_ends_the_run_by_name_with_a_whole_bag(tmp_path, node):
 
 
 @pytest.mark.parametrize("node", ["/overhead_tracker", "/recorder"])
-def test_a_node_stopped_at_the_end_is_named_and_the_bag_is_whole(tmp_path, node):
+def test_a_node_stopped_at_the_end_is_named_and_the_bag_is_whole(tmp_path: Path, node: str) -> None:
     killer = Killer(node, signal.SIGSTOP, after_timesteps=4)
     result = launch(short_scenario(), tmp_path / "bag", say=killer.say, on_start=killer.started)
     assert result.exit_code == 4
@@ -84,10 +84,11 @@ def test_a_node_stopped_at_the_end_is_named_and_the_bag_is_whole(tmp_path, node)
     assert len(analyse(load_run(tmp_path / "bag")).followers[0].timesteps) == 4
 
 
-def test_a_launcher_that_was_stopped_for_a_while_goes_on(tmp_path):
+def test_a_launcher_that_was_stopped_for_a_while_goes_on(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand", "--json"]
     command += ["--set", "leader.timesteps=4", "--bag", str(tmp_path / "bag")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
         for line in process.stderr:
             if line.startswith("timestep  1/"):
                 break
@@ -102,7 +103,7 @@ def test_a_launcher_that_was_stopped_for_a_while_goes_on(tmp_path):
     assert len(analyse(load_run(tmp_path / "bag")).followers[0].timesteps) == 4
 
 
-def test_a_lost_leader_ends_the_run_in_good_order(tmp_path):
+def test_a_lost_leader_ends_the_run_in_good_order(tmp_path: Path) -> None:
     result = launch(short_scenario("world.camera.pan_deg=-90.0"), tmp_path / "bag")
     assert result.exit_code == 3
     assert "follower_1 lost its beacon neighbour in timestep 0" in result.reason
@@ -110,11 +111,12 @@ def test_a_lost_leader_ends_the_run_in_good_order(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path, number):
+def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path: Path, number: signal.Signals) -> None:
     bag = tmp_path / "bag"
     command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand", "--json"]
     command += ["--set", "leader.timesteps=500", "--bag", str(bag)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
         for line in process.stderr:
             if line.startswith("timestep  2/"):
                 break
@@ -132,11 +134,12 @@ def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path, numbe
     assert len(analyse(load_run(bag)).followers[0].timesteps) >= 2
 
 
-def test_nodes_end_when_their_launcher_is_killed(tmp_path):
+def test_nodes_end_when_their_launcher_is_killed(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand"]
     command += ["--set", "leader.timesteps=500", "--bag", str(bag)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
         for line in process.stderr:
             if line.startswith("timestep  2/"):
                 break
@@ -155,7 +158,7 @@ def test_nodes_end_when_their_launcher_is_killed(tmp_path):
     assert (bag / "metadata.yaml").is_file()
 
 
-def _readable(descriptor, timeout_s):
+def _readable(descriptor: int, timeout_s: float) -> bool:
     """A process's descriptor becomes readable when it ends."""
     import select
 

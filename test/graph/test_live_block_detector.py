@@ -1,12 +1,14 @@
 """A real block_detector node: bad pictures, parameters set while it runs, and what its diagnostics say."""
 
 import array
+from pathlib import Path
+from typing import Any
 
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 
-from graph_lab import values_of
+from graph_lab import Lab, values_of
 from robot_formation import conversions, names
 from robot_formation.vision.pixy2.signatures import save_signatures
 from vision_helpers import GROUPS, RED, canvas
@@ -15,14 +17,14 @@ pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("block_detector")]
 SQUARE = canvas(((134, 60, 48, 48), RED))
 
 
-def image(number, **values):
+def image(number: int, **values: Any) -> Any:
     message = conversions.image(SQUARE, "camera", number * 33_333_333)
     for name, value in values.items():
         setattr(message, name, value)
     return message
 
 
-def set_parameter(lab, **values):
+def set_parameter(lab: Lab, **values: Any) -> Any:
     client = lab.node.create_client(SetParameters, "/follower_1/block_detector/set_parameters")
     lab.until(client.service_is_ready)
     request = SetParameters.Request(parameters=[Parameter(n, value=v).to_parameter_msg() for n, v in values.items()])
@@ -32,7 +34,7 @@ def set_parameter(lab, **values):
     return result
 
 
-def test_a_node_drops_bad_pictures_takes_parameters_and_reports_rate_and_time(lab, tmp_path):
+def test_a_node_drops_bad_pictures_takes_parameters_and_reports_rate_and_time(lab: Lab, tmp_path: Path) -> None:
     save_signatures(tmp_path / "taught.yaml", GROUPS["G1"])
     parameters = ("block_filtering:=0", f"signatures_file:={tmp_path / 'taught.yaml'}", "wait_for_listeners_s:=0.0")
     lab.start("block_detector", *(word for p in parameters for word in ("-p", p)), namespace="/follower_1")
@@ -57,7 +59,7 @@ def test_a_node_drops_bad_pictures_takes_parameters_and_reports_rate_and_time(la
     lab.until(lambda: len(blocks) == 4)
     assert conversions.read_blocks(blocks[3]) == []
 
-    def latest():
+    def latest() -> dict[str, str]:
         return {value.key: value.value for value in values_of(health, "block_detector")}
 
     lab.until(lambda: latest().get("frames") == "4")

@@ -1,10 +1,14 @@
 """The world's services over the live graph: strangers pause, step and reset it; a lost plate ends a run."""
 
+from pathlib import Path
+from typing import Any
+
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
+from graph_lab import Lab
 from graph_tools import launch, short_scenario
 from robot_formation import conversions, names
 from robot_formation.analysis.from_bag import load_run
@@ -17,7 +21,7 @@ pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("world_services")]
 class Stranger:
     """Somebody who drives the leader of a world of his own."""
 
-    def __init__(self, lab):
+    def __init__(self, lab: Lab) -> None:
         self._lab = lab
         arguments = ("-p", "camera.mode:=on_demand", "-p", "seed:=4", "-p", "wait_for_listeners_s:=0.0")
         lab.start("world", *arguments)
@@ -26,34 +30,34 @@ class Stranger:
         self._commands = lab.publisher(names.joint_commands("leader"))
         lab.until(lambda: len(self.poses) == 1)
 
-    def call(self, kind, name, request):
+    def call(self, kind: Any, name: str, request: Any) -> Any:
         client = self._lab.node.create_client(kind, name)
         self._lab.until(client.service_is_ready)
         future = client.call_async(request)
         self._lab.until(future.done)
         return future.result()
 
-    def command(self):
+    def command(self) -> None:
         self._commands.publish(conversions.joint_command(WheelCommand((1.6,) * 4, (4.0,) * 4), 0))
 
-    def drive(self):
+    def drive(self) -> tuple[list[float], Any]:
         """One motion: what the encoders and ground truth say at its end, without stamps."""
         poses, states = len(self.poses), len(self.states)
         self.command()
         self._lab.until(lambda: len(self.poses) > poses and len(self.states) > states and self.at_rest())
         return list(self.states[-1].position), self.poses[-1].pose
 
-    def at_rest(self):
+    def at_rest(self) -> bool:
         return not any(self.states[-1].velocity)
 
-    def reset(self):
+    def reset(self) -> Any:
         poses = len(self.poses)
         answer = self.call(Trigger, "/world/reset", Trigger.Request())
         if answer.success:
             self._lab.until(lambda: len(self.poses) > poses and self.at_rest())
         return answer
 
-    def set(self, **values):
+    def set(self, **values: Any) -> Any:
         parameters = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
         (result, *_) = self.call(
             SetParameters, "/world/set_parameters", SetParameters.Request(parameters=parameters)
@@ -61,7 +65,7 @@ class Stranger:
         return result
 
 
-def test_strangers_reset_a_world_and_get_the_same_run_again(lab):
+def test_strangers_reset_a_world_and_get_the_same_run_again(lab: Lab) -> None:
     stranger = Stranger(lab)
     first = [stranger.drive(), stranger.drive()]
     stamps = [conversions.stamp_of(message) for message in stranger.states]
@@ -74,7 +78,7 @@ def test_strangers_reset_a_world_and_get_the_same_run_again(lab):
     assert stranger.drive() != first[0]
 
 
-def test_parameters_are_checked_when_they_are_set(lab):
+def test_parameters_are_checked_when_they_are_set(lab: Lab) -> None:
     stranger = Stranger(lab)
     for name, value, says in (
         ("surface", "bowel", "did you mean 'bowl'"),
@@ -91,14 +95,19 @@ def test_parameters_are_checked_when_they_are_set(lab):
     stranger.drive()
 
 
-def test_a_paused_world_steps_on_request(lab):
+def test_a_paused_world_steps_on_request(lab: Lab) -> None:
     stranger = Stranger(lab)
     assert not stranger.call(Trigger, "/world/step", Trigger.Request()).success
     assert stranger.call(SetBool, "/world/pause", SetBool.Request(data=True)).message == "paused"
     stranger.command()
-    answers = []
+    answers: list[Any] = []
+
+    def stepped() -> bool:
+        answers.append(stranger.call(Trigger, "/world/step", Trigger.Request()))
+        return bool(answers[-1].success)
+
     # The command is on its way; until it is there, nothing is owed.
-    lab.until(lambda: answers.append(stranger.call(Trigger, "/world/step", Trigger.Request())) or answers[-1].success)
+    lab.until(stepped)
     assert answers[-1].message == "0.004167 s"
     assert stranger.call(Trigger, "/world/step", Trigger.Request()).message == "0.008333 s"
     assert stranger.states == []
@@ -106,7 +115,7 @@ def test_a_paused_world_steps_on_request(lab):
     lab.until(lambda: len(stranger.poses) == 2)
 
 
-def test_a_run_whose_leader_leaves_the_plate_ends_with_3_a_reason_and_a_whole_bag(tmp_path):
+def test_a_run_whose_leader_leaves_the_plate_ends_with_3_a_reason_and_a_whole_bag(tmp_path: Path) -> None:
     scenario = short_scenario("leader.timesteps=6", "start_y_m=1.66", track="one")
     result = launch(scenario, tmp_path / "bag")
     assert result.exit_code == 3

@@ -1,30 +1,40 @@
 """Two formations in one ROS domain, each in a namespace of its own, started from the table of processes."""
 
+import subprocess
+from functools import partial
+from pathlib import Path
+
 import pytest
 import yaml
 
+from graph_lab import Lab
 from graph_tools import displacements, launch, short_scenario
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.quantities import analyse
 from robot_formation.bag.reader import read_bag
-from robot_formation.launching.processes import processes, progress
+from robot_formation.experiment.scenario import Scenario
+from robot_formation.launching.processes import Process, processes, progress
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("namespaces")]
 
 SITES = {"/site_a": 3, "/deep/site_b": 4}  # namespace and seed
 
 
-def scenario(seed):
+def scenario(seed: int) -> Scenario:
     return short_scenario("leader.timesteps=3", seed=seed)
 
 
-def start(lab, folder, process):
+def start(lab: Lab, folder: Path, process: Process) -> subprocess.Popen[str]:
     file = folder / f"{process.name.strip('/').replace('/', '_')}.yaml"
     file.write_text(yaml.safe_dump({"/**": {"ros__parameters": process.ros_parameters()}}))
     return lab.start(process.executable, "--params-file", str(file), namespace=process.namespace)
 
 
-def end(process):
+def has_ended(process: subprocess.Popen[str]) -> bool:
+    return process.poll() is not None
+
+
+def end(process: subprocess.Popen[str]) -> str:
     process.terminate()
     output, errors = process.communicate(timeout=60)
     assert process.returncode == 0, errors
@@ -32,7 +42,7 @@ def end(process):
 
 
 @pytest.fixture
-def both(lab, tmp_path):
+def both(lab: Lab, tmp_path: Path) -> tuple[dict[str, Path], dict[str, str]]:
     """Run both formations at the same time; the bags by namespace, and what the followers of progress have printed."""
     running = {}
     for namespace, seed in SITES.items():
@@ -42,7 +52,7 @@ def both(lab, tmp_path):
     said, bags = {}, {}
     for namespace, (bag, nodes) in running.items():
         leader = nodes.pop(f"{namespace}/leader/leader")
-        lab.until(lambda leader=leader: leader.poll() is not None)
+        lab.until(partial(has_ended, leader))
         assert leader.returncode == 0, leader.communicate()
         recorder = nodes.pop(f"{namespace}/recorder")
         printed = {name: end(node) for name, node in nodes.items()}
@@ -51,7 +61,9 @@ def both(lab, tmp_path):
     return bags, said
 
 
-def test_formations_in_namespaces_run_side_by_side_as_they_do_alone(both, tmp_path):
+def test_formations_in_namespaces_run_side_by_side_as_they_do_alone(
+    both: tuple[dict[str, Path], dict[str, str]], tmp_path: Path
+) -> None:
     bags, said = both
     for namespace, seed in SITES.items():
         alone = tmp_path / f"alone_{seed}"

@@ -2,11 +2,12 @@
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from graph_lab import DEADLINE_S
+from graph_lab import DEADLINE_S, Lab
 from robot_formation import names
 from robot_formation.network import loopback
 from robot_formation.network.loopback import PROFILES, RANGE, stay_here, use_loopback
@@ -16,7 +17,7 @@ PROFILE = str(config_dir() / "loopback.xml")
 LOOPBACK = ("0100007F", "00000000000000000000000001000000")
 
 
-def sockets(pid):
+def sockets(pid: int) -> list[str]:
     """Local addresses of a process's UDP and TCP sockets as /proc shows them: hexadecimal, without the port."""
     links = [os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir() if entry.is_symlink()]
     own = {link[8:-1] for link in links if link.startswith("socket:")}
@@ -29,12 +30,13 @@ def sockets(pid):
     return found
 
 
-def on_graph(test):
-    return pytest.mark.graph(pytest.mark.xdist_group("network")(test))
+def on_graph(test: Callable[..., None]) -> Callable[..., None]:
+    marked: Callable[..., None] = pytest.mark.graph(pytest.mark.xdist_group("network")(test))
+    return marked
 
 
 @on_graph
-def test_no_socket_of_a_node_is_open_to_the_network_and_others_find_it(lab, tmp_path):
+def test_no_socket_of_a_node_is_open_to_the_network_and_others_find_it(lab: Lab, tmp_path: Path) -> None:
     heard = lab.collect(names.DIAGNOSTICS)
     nodes = {
         "/leader/drive": lab.start("drive", namespace="/leader"),
@@ -49,7 +51,7 @@ def test_no_socket_of_a_node_is_open_to_the_network_and_others_find_it(lab, tmp_
 
 
 @on_graph
-def test_a_node_that_ros_itself_limits_to_this_machine_is_found_too(lab):
+def test_a_node_that_ros_itself_limits_to_this_machine_is_found_too(lab: Lab) -> None:
     """A command of ROS's own, say: it knows nothing of the profile."""
     foreign = {name: value for name, value in lab.environment.items() if name not in PROFILES}
     code = """
@@ -62,6 +64,7 @@ print("found", flush=True)
 """
     lab.start("drive", namespace="/leader")
     process = lab.open([sys.executable, "-c", code], {**foreign, RANGE: "LOCALHOST"})
+    assert process.stdout is not None
     assert process.stdout.readline() == "found\n"
 
 
@@ -82,7 +85,7 @@ print("found", flush=True)
 
 
 @on_graph
-def test_fourteen_participants_of_one_domain_find_each_other(lab):
+def test_fourteen_participants_of_one_domain_find_each_other(lab: Lab) -> None:
     process = lab.open([sys.executable, "-c", MANY], lab.environment)
     out, error = process.communicate(timeout=DEADLINE_S)
     assert out == "found\n", error
@@ -90,7 +93,7 @@ def test_fourteen_participants_of_one_domain_find_each_other(lab):
 
 @pytest.mark.parametrize("middleware", [{}, {"RMW_IMPLEMENTATION": "rmw_fastrtps_dynamic_cpp"}])
 @pytest.mark.parametrize("earlier", [{}, dict.fromkeys(PROFILES, PROFILE)])
-def test_discovery_on_this_machine_gets_the_profile(middleware, earlier):
+def test_discovery_on_this_machine_gets_the_profile(middleware: dict[str, str], earlier: dict[str, str]) -> None:
     environment = {RANGE: "LOCALHOST", **middleware, **earlier}
     use_loopback(environment)
     assert environment == {RANGE: "SYSTEM_DEFAULT", **middleware, **dict.fromkeys(PROFILES, PROFILE)}
@@ -108,13 +111,13 @@ def test_discovery_on_this_machine_gets_the_profile(middleware, earlier):
         {RANGE: "LOCALHOST", PROFILES[1]: "/home/somebody/mine.xml"},
     ],
 )
-def test_whoever_asks_for_something_else_gets_that(wish):
+def test_whoever_asks_for_something_else_gets_that(wish: dict[str, str]) -> None:
     environment = dict(wish)
     use_loopback(environment)
     assert environment == wish
 
 
-def test_without_the_profile_ros_limits_discovery_itself(monkeypatch, tmp_path):
+def test_without_the_profile_ros_limits_discovery_itself(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(loopback, "config_dir", lambda: tmp_path)
     environment = {RANGE: "LOCALHOST"}
     use_loopback(environment)
@@ -131,7 +134,7 @@ def test_without_the_profile_ros_limits_discovery_itself(monkeypatch, tmp_path):
         ({"ROS_LOCALHOST_ONLY": "1"}, None),
     ],
 )
-def test_verbs_stay_on_this_machine_unless_the_user_asks_otherwise(given, expected):
+def test_verbs_stay_on_this_machine_unless_the_user_asks_otherwise(given: dict[str, str], expected: str | None) -> None:
     environment = dict(given)
     stay_here(environment)
     assert environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == expected

@@ -4,10 +4,13 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from graph_lab import DEADLINE_S
+from graph_lab import DEADLINE_S, Lab
 from graph_tools import alive
 from robot_formation import names
 from robot_formation.components.catalogue import KINDS
@@ -17,13 +20,13 @@ from robot_formation.parameters import specs
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("node_starts")]
 
 
-def node(name, *arguments, **options):
+def node(name: str, *arguments: str, **options: Any) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "robot_formation.nodes", name, *arguments]
     return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False, **options)
 
 
 @pytest.mark.parametrize("name", sorted(KINDS))
-def test_help_tells_purpose_usage_topics_and_every_parameter(name):
+def test_help_tells_purpose_usage_topics_and_every_parameter(name: str) -> None:
     done = node(name, "--help")
     assert (done.returncode, done.stderr) == (0, "")
     assert f"usage: ros2 run robot_formation {name} --ros-args" in done.stdout
@@ -42,7 +45,7 @@ def test_help_tells_purpose_usage_topics_and_every_parameter(name):
         ("progress", "followers (integer, 1; 1 to 9)"),
     ],
 )
-def test_help_of_the_nodes_for_bags_and_launched_runs(name, parameter):
+def test_help_of_the_nodes_for_bags_and_launched_runs(name: str, parameter: str) -> None:
     done = node(name, "-h")
     assert (done.returncode, done.stderr) == (0, "")
     assert "topics and services" in done.stdout
@@ -58,7 +61,7 @@ def test_help_of_the_nodes_for_bags_and_launched_runs(name, parameter):
         ("recorder", ["-p", "paht:=x"], "/recorder: no parameter 'paht'; did you mean 'path'?"),
     ],
 )
-def test_a_complaint_begins_with_the_nodes_name_once(lab, name, arguments, said):
+def test_a_complaint_begins_with_the_nodes_name_once(lab: Lab, name: str, arguments: list[str], said: str) -> None:
     process = lab.start(name, *arguments)
     _, error = process.communicate(timeout=DEADLINE_S)
     assert process.returncode == 2
@@ -66,15 +69,19 @@ def test_a_complaint_begins_with_the_nodes_name_once(lab, name, arguments, said)
     assert len(error.splitlines()) == 1
 
 
-def test_a_node_says_when_it_is_ready_and_what_it_waits_for(lab):
+def test_a_node_says_when_it_is_ready_and_what_it_waits_for(lab: Lab) -> None:
     process = lab.start("drive", namespace="/leader")
+    assert process.stderr is not None
     assert "ready, waiting for move, joint_states" in process.stderr.readline()
 
 
 @pytest.mark.parametrize(("name", "namespace"), [("drive", "/leader"), ("recorder", "/")])
-def test_signals_that_come_while_a_node_ends_do_not_kill_it(lab, tmp_path, name, namespace):
+def test_signals_that_come_while_a_node_ends_do_not_kill_it(
+    lab: Lab, tmp_path: Path, name: str, namespace: str
+) -> None:
     arguments = ["-p", f"path:={tmp_path / 'bag'}"] if name == "recorder" else []
     process = lab.start(name, *arguments, namespace=namespace)
+    assert process.stderr is not None
     assert "ready" in process.stderr.readline()
     numbers = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
     while process.poll() is None:
@@ -85,7 +92,7 @@ def test_signals_that_come_while_a_node_ends_do_not_kill_it(lab, tmp_path, name,
     assert process.returncode == 0, process.stderr.read()
 
 
-def test_the_choices_of_a_surface_are_in_its_description(lab):
+def test_the_choices_of_a_surface_are_in_its_description(lab: Lab) -> None:
     from rcl_interfaces.srv import DescribeParameters
 
     lab.start("overhead_tracker")
@@ -96,7 +103,7 @@ def test_the_choices_of_a_surface_are_in_its_description(lab):
     assert "known: bowl, plane" in future.result().descriptors[0].additional_constraints
 
 
-def test_a_flood_of_bad_messages_is_a_few_lines(lab):
+def test_a_flood_of_bad_messages_is_a_few_lines(lab: Lab) -> None:
     process = lab.start("world")
     commands = lab.publisher(names.joint_commands("leader"))
     health = lab.collect(names.DIAGNOSTICS)
@@ -110,13 +117,13 @@ def test_a_flood_of_bad_messages_is_a_few_lines(lab):
     assert len([line for line in error.splitlines() if "[WARN]" in line]) <= 20
 
 
-def names_message():
+def names_message() -> Any:
     from sensor_msgs.msg import JointState
 
     return JointState(name=["nothing"], position=[float("nan")])
 
 
-def warnings_of(health):
+def warnings_of(health: Sequence[Any]) -> list[str]:
     return [
         value.value
         for array in health

@@ -2,15 +2,21 @@
 
 import math
 import re
+import subprocess
 import sys
 import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 from rclpy.node import Node
 
+from graph_lab import Lab
 from repository import ROOT
 from robot_formation import conversions, names
 from robot_formation.drive.movement_system import JOINTS, DriveParameters
+from robot_formation.names import Topic
 from robot_formation.nodes.host.component_node import qos_profile
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("real_robots")]
@@ -35,21 +41,21 @@ def ccc_get_blocks(most, found):
 class Bridge:
     """A motor controller: turns the wheels at once, reports on the way and at rest, and echoes the command's number."""
 
-    def __init__(self, lab):
+    def __init__(self, lab: Lab) -> None:
         self.node = Node("world", namespace=ROBOT, context=lab.context)
         lab.executor.add_node(self.node)
         self.positions = dict.fromkeys(JOINTS, 7.0)  # since power-up
-        self.numbers = []
+        self.numbers: list[str] = []
         self._publisher = self._make(self.node.create_publisher, names.joint_states())
         self._make(self.node.create_subscription, names.joint_commands(), self._turn)
         self._make(self.node.create_subscription, names.camera_request(), lambda message: None)  # the camera streams
         lab.until(lambda: self._publisher.get_subscription_count() == 1)
         self._report("", 0.0)
 
-    def _make(self, make, topic, *callback):
+    def _make(self, make: Callable[..., Any], topic: Topic, *callback: Callable[[Any], None]) -> Any:
         return make(conversions.message_class(topic.type), topic.name, *callback, qos_profile(topic.qos))
 
-    def _turn(self, message):
+    def _turn(self, message: Any) -> None:
         number = message.header.frame_id
         self.numbers.append(number)
         self._report(number, 1.0)
@@ -61,15 +67,15 @@ class Bridge:
         self.positions["encoder_wheel_v"] += distance / p.encoder_radius_m
         self._report(number, 0.0)
 
-    def _report(self, number, speed):
+    def _report(self, number: str, speed: float) -> None:
         values = list(self.positions.values())
         message = conversions.joint_states(JOINTS, values, [speed] * len(JOINTS), time.time_ns(), number)
         self._publisher.publish(message)
 
 
-def start_camera(lab, folder):
+def start_camera(lab: Lab, folder: Path) -> subprocess.Popen[str]:
     """The page's own driver, with a camera that is always asked in formation."""
-    code = re.search(r"<!-- pixy2 -->\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL)[1]
+    code = re.findall(r"<!-- pixy2 -->\n```python\n(.*?)```", PAGE.read_text(), re.DOTALL)[0]
     (folder / "driver.py").write_text(code)
     (folder / "pixy.py").write_text(PIXY)
     command = [sys.executable, str(folder / "driver.py"), "--ros-args", "-r", f"__ns:={ROBOT}"]
@@ -77,7 +83,7 @@ def start_camera(lab, folder):
     return lab.open(command, {**lab.environment, "PYTHONPATH": path, "PYTHONSAFEPATH": ""})
 
 
-def test_a_follower_drives_a_timestep_with_a_pixy2_and_a_motor_controller(lab, tmp_path):
+def test_a_follower_drives_a_timestep_with_a_pixy2_and_a_motor_controller(lab: Lab, tmp_path: Path) -> None:
     camera = start_camera(lab, tmp_path)
     for node in ("drive", "predictor", "fine_tuner"):
         lab.start(node, "-p", "wait_for_listeners_s:=60.0", namespace=ROBOT)

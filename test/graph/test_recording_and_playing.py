@@ -6,6 +6,9 @@ import pty
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,24 +42,39 @@ BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 class BagLab(Lab):
     """A lab that also calls the command line in its domain."""
 
-    def formation(self, *arguments, **options):
+    def formation(self, *arguments: object, **options: Any) -> subprocess.Popen[str]:
         command = [sys.executable, "-m", "robot_formation.cli", *map(str, arguments)]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
         process = subprocess.Popen(command, env=self.environment, text=True, **pipes)
         self.processes.append(process)
         return process
 
-    def record(self, *arguments, **options):
+    def record(self, *arguments: object, **options: Any) -> subprocess.Popen[str]:
         """Start recording; returns when the recorder runs."""
         process = self.formation("record", *arguments, "--json", **options)
-        assert process.stderr.readline().startswith("recording into")
+        assert self.complaint(process).startswith("recording into")
         return process
 
-    def end(self, process, code=0):
+    def words_on(self, topic: str) -> list[str]:
+        """A list that grows by each text said on a topic."""
+        said: list[str] = []
+
+        def hear(message: Any) -> None:
+            said.append(message.data)
+
+        self.node.create_subscription(String, topic, hear, RELIABLE)
+        return said
+
+    def complaint(self, process: subprocess.Popen[str]) -> str:
+        """The next line on a process's standard error."""
+        assert process.stderr is not None
+        return process.stderr.readline()
+
+    def end(self, process: subprocess.Popen[str], code: int = 0) -> Any:
         process.send_signal(signal.SIGINT)
         return self.result(process, code)
 
-    def result(self, process, code=0):
+    def result(self, process: subprocess.Popen[str], code: int = 0) -> Any:
         out, error = process.communicate(timeout=DEADLINE_S)
         assert process.returncode == code, error
         assert "Traceback" not in error
@@ -64,25 +82,25 @@ class BagLab(Lab):
 
 
 @pytest.fixture
-def lab(tmp_path):
+def lab(tmp_path: Path) -> Iterator[BagLab]:
     with open_lab(tmp_path, BagLab) as made:
         yield made
 
 
-def payloads(bag):
+def payloads(bag: Path) -> dict[str, list[bytes]]:
     with read_bag(bag) as opened:
-        found = {topic: [] for topic in opened.topics}
+        found: dict[str, list[bytes]] = {topic: [] for topic in opened.topics}
         for message in opened.raw_messages(opened.topics):
             found[message.topic].append(message.cdr)
     return found
 
 
-def padded(message, type_name):
+def padded(message: object, type_name: str) -> bytes:
     cdr = bytes(STORE.serialize_cdr(message, type_name))
     return cdr + bytes(-len(cdr) % 4)
 
 
-def write_many_kinds(path):
+def write_many_kinds(path: Path) -> None:
     """Bursts at one time, a latched topic that keeps one, a history, best effort, and pictures."""
     topics = {
         "/burst": (TICK, TopicQos(history="keep_all", depth=0)),
@@ -108,7 +126,7 @@ def write_many_kinds(path):
             writer.write("/picture", cdr + bytes(-len(cdr) % 4), now)
 
 
-def test_record_play_and_record_again_gives_the_same_messages_in_the_same_order(lab, tmp_path):
+def test_record_play_and_record_again_gives_the_same_messages_in_the_same_order(lab: BagLab, tmp_path: Path) -> None:
     write_many_kinds(tmp_path / "first")
     for source, target in (("first", "second"), ("second", "third")):
         recorder = lab.record("--all", "-o", tmp_path / target)
@@ -124,7 +142,7 @@ def test_record_play_and_record_again_gives_the_same_messages_in_the_same_order(
     assert (offered["/loose"].reliability, offered["/map"].durability) == ("best_effort", "transient_local")
 
 
-def test_topics_are_chosen_discovered_late_and_those_that_never_come_are_told(lab, tmp_path):
+def test_topics_are_chosen_discovered_late_and_those_that_never_come_are_told(lab: BagLab, tmp_path: Path) -> None:
     recorder = lab.record(
         "/named", "/never", "--regex", "/match/.*", "-x", ".*/not", "-o", tmp_path / "bag", "--time", "simulated"
     )
@@ -157,14 +175,14 @@ def test_topics_are_chosen_discovered_late_and_those_that_never_come_are_told(la
         assert bag.contents[0].type_hash == STORE.hash_rihs01(STRING)
 
 
-def test_the_recorder_tells_how_it_goes_and_keeps_that_out_of_its_bag(lab, tmp_path):
+def test_the_recorder_tells_how_it_goes_and_keeps_that_out_of_its_bag(lab: BagLab, tmp_path: Path) -> None:
     heard = lab.collect(names.DIAGNOSTICS)
     recorder = lab.record("--all", "-o", tmp_path / "bag")
     publisher = lab.node.create_publisher(UInt32, "/tick", RELIABLE)
     lab.until(publisher.get_subscription_count)
     publisher.publish(UInt32(data=1))
 
-    def told(key):
+    def told(key: str) -> list[str]:
         return [value.value for value in values_of(heard, "recorder") if value.key == key]
 
     lab.until(lambda: told("messages")[-1:] == ["1"])
@@ -184,7 +202,7 @@ def test_the_recorder_tells_how_it_goes_and_keeps_that_out_of_its_bag(lab, tmp_p
     assert message.message.status[0].name == "stranger"
 
 
-def flood(lab, publisher, enough):
+def flood(lab: BagLab, publisher: Any, enough: Callable[[], bool]) -> None:
     """Publish numbers until a condition holds."""
     sent = 0
     while not enough():
@@ -218,7 +236,7 @@ sys.stdin.read()
 """
 
 
-def test_messages_lost_in_a_flood_are_told_and_the_bag_is_whole(lab, tmp_path):
+def test_messages_lost_in_a_flood_are_told_and_the_bag_is_whole(lab: BagLab, tmp_path: Path) -> None:
     sent = 60_000
     recorder = lab.record("/tick", "-o", tmp_path / "bag")
     source = subprocess.Popen(
@@ -229,6 +247,7 @@ def test_messages_lost_in_a_flood_are_told_and_the_bag_is_whole(lab, tmp_path):
         text=True,
     )
     lab.processes.append(source)
+    assert source.stdout is not None
     assert source.stdout.readline() == "sent\n"
     report = lab.end(recorder)
     found = ticks_of(tmp_path / "bag")
@@ -240,31 +259,33 @@ def test_messages_lost_in_a_flood_are_told_and_the_bag_is_whole(lab, tmp_path):
     assert bag_info(tmp_path / "bag").to_mapping()["metadata"].get("lost", {}) == report["lost"]
 
 
-def test_a_type_that_is_not_that_of_a_topic_made_by_the_recorder_is_told(lab, tmp_path):
+def test_a_type_that_is_not_that_of_a_topic_made_by_the_recorder_is_told(lab: BagLab, tmp_path: Path) -> None:
     recorder = lab.record("/tf", "/words", "-o", tmp_path / "bag")
     publishers = [lab.node.create_publisher(String, name, RELIABLE) for name in ("/tf", "/words")]
     assert "/tf is not recorded: its type is std_msgs/msg/String" in "".join(
-        recorder.stderr.readline() for _ in publishers
+        lab.complaint(recorder) for _ in publishers
     )
     lab.until(publishers[1].get_subscription_count)
     assert lab.end(recorder)["topics"] == {"/words": 0}
 
 
-def test_topics_called_tf_elsewhere_are_recorded_with_any_type_unless_a_formation_is_there(lab, tmp_path):
+def test_topics_called_tf_elsewhere_are_recorded_with_any_type_unless_a_formation_is_there(
+    lab: BagLab, tmp_path: Path
+) -> None:
     odometry = conversions.message_class(ODOMETRY)
     odom = lab.node.create_publisher(odometry, "/site/ground_truth/leader/odom", RELIABLE)
     recorder = lab.record("/camera/tf", "/site/ground_truth/leader/odom", "/site/tf", "-o", tmp_path / "bag")
     lab.until(odom.get_subscription_count)
     others = [lab.node.create_publisher(String, name, RELIABLE) for name in ("/camera/tf", "/site/tf")]
     lab.until(others[0].get_subscription_count)
-    lines = [recorder.stderr.readline() for _ in range(3)]
+    lines = [lab.complaint(recorder) for _ in range(3)]
     assert any("/site/tf is not recorded: its type is std_msgs/msg/String" in line for line in lines), lines
     others[0].publish(String(data="hello"))
     odom.publish(odometry())
     assert lab.end(recorder)["topics"]["/camera/tf"] == 1
 
 
-def test_diagnostics_that_cannot_be_decoded_do_not_end_a_recorder_in_a_namespace(lab, tmp_path):
+def test_diagnostics_that_cannot_be_decoded_do_not_end_a_recorder_in_a_namespace(lab: BagLab, tmp_path: Path) -> None:
     options = [f"path:={tmp_path / 'bag'}", "own_namespace:=true"]
     recorder = lab.start("recorder", *(word for option in options for word in ("-p", option)), namespace="/site")
     kind = conversions.message_class(names.DIAGNOSTICS.type)
@@ -284,7 +305,7 @@ def test_diagnostics_that_cannot_be_decoded_do_not_end_a_recorder_in_a_namespace
 
 
 @pytest.mark.parametrize("size", [3000, 20_000])
-def test_a_recorder_that_is_killed_leaves_every_finished_chunk(lab, tmp_path, size):
+def test_a_recorder_that_is_killed_leaves_every_finished_chunk(lab: BagLab, tmp_path: Path, size: int) -> None:
     recorder = lab.record("/tick", "-o", tmp_path / "bag", "--chunk-size", "0.005")
     publisher = lab.node.create_publisher(UInt32, "/tick", RELIABLE)
     lab.until(publisher.get_subscription_count)
@@ -298,7 +319,7 @@ def test_a_recorder_that_is_killed_leaves_every_finished_chunk(lab, tmp_path, si
     assert ticks_of(tmp_path / "saved") == finished == list(range(len(finished)))
 
 
-def test_a_recorder_whose_disk_is_full_ends_with_a_clear_error(lab, tmp_path):
+def test_a_recorder_whose_disk_is_full_ends_with_a_clear_error(lab: BagLab, tmp_path: Path) -> None:
     options = {"preexec_fn": limit_file_size}
     recorder = lab.record("/tick", "-o", tmp_path / "bag", "--compression", "none", "--chunk-size", "0.005", **options)
     publisher = lab.node.create_publisher(UInt32, "/tick", RELIABLE)
@@ -314,18 +335,17 @@ def test_a_recorder_whose_disk_is_full_ends_with_a_clear_error(lab, tmp_path):
     assert saved > 100
 
 
-def write_words(path, count=5):
+def write_words(path: Path, count: int = 5) -> None:
     with BagWriter(path) as writer:
         writer.add_topic("/words", STRING, TopicQos(history="keep_all", depth=0))
         for number in range(count):
             writer.write("/words", padded(text(f"{number}"), STRING), (10 + number) * 10**8)
 
 
-def test_the_player_steps_by_key_and_service_and_gives_the_time(lab, tmp_path):
+def test_the_player_steps_by_key_and_service_and_gives_the_time(lab: BagLab, tmp_path: Path) -> None:
     write_words(tmp_path / "bag")
     keys, terminal = pty.openpty()
-    said, clock = [], lab.collect(names.CLOCK_TOPIC)
-    lab.node.create_subscription(String, "/renamed", lambda message: said.append(message.data), RELIABLE)
+    said, clock = lab.words_on("/renamed"), lab.collect(names.CLOCK_TOPIC)
     options = ["--pause", "--wait", "20", "--clock", "50", "--remap", "/words:=/renamed", "--json"]
     player = lab.formation(
         "play", tmp_path / "bag", *options, stdin=terminal, preexec_fn=lambda: own_terminal(terminal)
@@ -354,7 +374,7 @@ def test_the_player_steps_by_key_and_service_and_gives_the_time(lab, tmp_path):
     assert stamps == sorted(stamps)
 
 
-def own_terminal(terminal):
+def own_terminal(terminal: int) -> None:
     """Make a terminal the controlling one of this process's own session, as a shell does."""
     import fcntl
     import termios
@@ -363,10 +383,9 @@ def own_terminal(terminal):
     fcntl.ioctl(terminal, termios.TIOCSCTTY, 0)
 
 
-def test_a_player_node_repeats_its_bag_until_a_signal(lab, tmp_path):
+def test_a_player_node_repeats_its_bag_until_a_signal(lab: BagLab, tmp_path: Path) -> None:
     write_words(tmp_path / "bag", count=2)
-    said = []
-    lab.node.create_subscription(String, "/words", lambda message: said.append(message.data), RELIABLE)
+    said = lab.words_on("/words")
     player = lab.start("player", "-p", f"bag:={tmp_path / 'bag'}", "-p", "loop:=true", "-p", "wait_s:=20.0")
     lab.until(lambda: len(said) >= 5)
     assert said[:5] == ["0", "1", "0", "1", "0"]
@@ -375,9 +394,9 @@ def test_a_player_node_repeats_its_bag_until_a_signal(lab, tmp_path):
     assert player.returncode == 0, error
 
 
-def test_ctrl_c_ends_a_play_with_130(lab, tmp_path):
+def test_ctrl_c_ends_a_play_with_130(lab: BagLab, tmp_path: Path) -> None:
     write_words(tmp_path / "bag", count=1000)
-    said = lab.node.create_subscription(String, "/words", (heard := []).append, RELIABLE)
+    heard = lab.words_on("/words")
     player = lab.formation("play", tmp_path / "bag", "--wait", "20")
     lab.until(lambda: heard)
     player.send_signal(signal.SIGINT)
@@ -385,4 +404,3 @@ def test_ctrl_c_ends_a_play_with_130(lab, tmp_path):
     assert player.returncode == 130
     assert "schedule error: median" in out
     assert error.strip().splitlines()[-1] == "formation play: interrupted"
-    assert said is not None

@@ -3,10 +3,12 @@
 import signal
 import subprocess
 import sys
+from functools import partial
+from pathlib import Path
 
 import pytest
 
-from graph_lab import DEADLINE_S, values_of
+from graph_lab import DEADLINE_S, Lab, values_of
 from robot_formation import conversions, names
 from robot_formation.bag.reader import read_bag
 from robot_formation.components.catalogue import KINDS
@@ -19,7 +21,7 @@ from robot_formation.paths import config_dir
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("nodes")]
 
 
-def alone(name, namespace, *arguments, tmp_path):
+def alone(name: str, namespace: str, *arguments: str, tmp_path: Path) -> tuple[int, str]:
     """Run a node that must end by itself; returns exit code and its last line."""
     command = [sys.executable, "-m", "robot_formation.nodes", name, "--ros-args", "-r", f"__ns:={namespace}"]
     with DomainReservation() as domain:
@@ -59,21 +61,27 @@ def alone(name, namespace, *arguments, tmp_path):
         ("drive", "/leader", ["--params-file", "missing.yaml"], ["missing.yaml"]),
     ],
 )
-def test_a_bad_parameter_is_one_line_and_exit_code_2(tmp_path, name, namespace, arguments, words):
+def test_a_bad_parameter_is_one_line_and_exit_code_2(
+    tmp_path: Path, name: str, namespace: str, arguments: list[str], words: list[str]
+) -> None:
     code, line = alone(name, namespace, *arguments, tmp_path=tmp_path)
     assert code == 2
     for word in words:
         assert word in line
 
 
+def ended_or_there(lab: Lab, process: subprocess.Popen[str], node: tuple[str, str]) -> bool:
+    return bool(process.poll()) or node in lab.node.get_node_names_and_namespaces()
+
+
 @pytest.mark.parametrize("name", [*KINDS, "recorder"])
-def test_a_node_ends_cleanly_on_signals(lab, tmp_path, name):
+def test_a_node_ends_cleanly_on_signals(lab: Lab, tmp_path: Path, name: str) -> None:
     robots = KINDS[name].robots if name in KINDS else ""
     namespace = {"": "/", "leader": "/leader"}.get(robots, "/follower_1")
     options = ["-p", f"path:={tmp_path / 'bag'}"] if name == "recorder" else ["-p", "wait_for_listeners_s:=600.0"]
     for number in (signal.SIGINT, signal.SIGTERM):
         process = lab.start(name, *options, namespace=namespace)
-        lab.until(lambda ended=process.poll: ended() or (name, namespace) in lab.node.get_node_names_and_namespaces())
+        lab.until(partial(ended_or_there, lab, process, (name, namespace)))
         process.send_signal(number)
         _, errors = process.communicate(timeout=DEADLINE_S)
         assert process.returncode == 0, errors
@@ -84,7 +92,7 @@ def test_a_node_ends_cleanly_on_signals(lab, tmp_path, name):
         lab.rejoin()
 
 
-def test_ctrl_c_while_a_node_still_starts_is_not_lost(tmp_path):
+def test_ctrl_c_while_a_node_still_starts_is_not_lost(tmp_path: Path) -> None:
     early = "import os, signal; from robot_formation.nodes import executables as e; take = e.stop_on_signals"
     code = f"{early}; e.stop_on_signals = lambda: (take(), os.kill(os.getpid(), signal.SIGINT))"
     command = [sys.executable, "-c", f"{code}; raise SystemExit(e.leader())", "--ros-args", "-r", "__ns:=/leader"]
@@ -94,7 +102,7 @@ def test_ctrl_c_while_a_node_still_starts_is_not_lost(tmp_path):
     assert (completed.returncode, completed.stderr) == (0, "")
 
 
-def test_strangers_drive_a_robot_and_its_camera_in_a_world_of_their_own(lab, tmp_path):
+def test_strangers_drive_a_robot_and_its_camera_in_a_world_of_their_own(lab: Lab, tmp_path: Path) -> None:
     recorder = lab.start("recorder", "-p", f"path:={tmp_path / 'bag'}")
     lab.start("world", "-p", "surface:=plane", "-p", "camera.mode:=on_demand", "-p", "recorder:=recorder")
     joint_states = lab.collect(names.joint_states("leader"))
@@ -120,7 +128,7 @@ def test_strangers_drive_a_robot_and_its_camera_in_a_world_of_their_own(lab, tmp
         assert len(list(bag.messages(["/leader/joint_states"]))) == len(joint_states)
 
 
-def test_bad_wheel_commands_move_nothing_and_are_said(lab):
+def test_bad_wheel_commands_move_nothing_and_are_said(lab: Lab) -> None:
     lab.start("world", "-p", "camera.mode:=on_demand", "-p", "wait_for_listeners_s:=0.0")
     joint_states = lab.collect(names.joint_states("leader"))
     health = lab.collect(names.DIAGNOSTICS)
@@ -138,7 +146,7 @@ def test_bad_wheel_commands_move_nothing_and_are_said(lab):
     lab.until(lambda: any(joint_states[-1].position) and not any(joint_states[-1].velocity))
 
 
-def test_drive_stop_ends_a_move_and_leader_stop_pauses_the_track(lab):
+def test_drive_stop_ends_a_move_and_leader_stop_pauses_the_track(lab: Lab) -> None:
     lab.start("world", "-p", "real_time_factor:=1.0", "-p", "wait_for_listeners_s:=0.0", "-p", "camera.mode:=on_demand")
     lab.start("drive", namespace="/leader")
     moved = lab.collect(names.MOVED, namespace="/leader")
@@ -152,7 +160,7 @@ def test_drive_stop_ends_a_move_and_leader_stop_pauses_the_track(lab):
     assert not lab.call("/leader/drive/stop").success
 
 
-def test_the_leader_pauses_and_goes_on(lab):
+def test_the_leader_pauses_and_goes_on(lab: Lab) -> None:
     lab.start("leader", "-p", "timesteps:=2", "-p", "wait_for_listeners_s:=600.0", namespace="/leader")
     ticks = lab.collect(names.formation_done("leader"))
     health = lab.collect(names.DIAGNOSTICS)

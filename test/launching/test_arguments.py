@@ -1,13 +1,16 @@
 """The launch file's arguments: settings in one text, complaints by their names."""
 
+from pathlib import Path
+
 import pytest
 
 from robot_formation.errors import FormationError
+from robot_formation.experiment.scenario import Scenario
 from robot_formation.launching import arguments
 from robot_formation.launching.arguments import ARGUMENTS, rviz_remappings, scenario_of, split_settings
 
 
-def scenario(**values):
+def scenario(**values: str) -> Scenario:
     return scenario_of({name: argument.default for name, argument in ARGUMENTS.items()} | values)
 
 
@@ -26,17 +29,17 @@ def scenario(**values):
         ("drive.calibration.v=[0.0, 33] seed=3", ["drive.calibration.v=[0.0, 33]", "seed=3"]),
     ],
 )
-def test_settings_are_split_at_spaces_outside_lists_and_quotes(text, settings):
+def test_settings_are_split_at_spaces_outside_lists_and_quotes(text: str, settings: list[str]) -> None:
     assert split_settings(text) == settings
 
 
 @pytest.mark.parametrize("text", ["seed=[3", "seed=3]", "name='my run"])
-def test_what_is_not_closed_is_said(text):
+def test_what_is_not_closed_is_said(text: str) -> None:
     with pytest.raises(FormationError, match="has no partner"):
         split_settings(text)
 
 
-def test_a_list_with_spaces_arrives_in_the_scenario():
+def test_a_list_with_spaces_arrives_in_the_scenario() -> None:
     settings = "world.surface_parameters=[slope_deg=2, direction_deg=0] followers=2"
     found = scenario(track="one", surface="inclined_plane", set=settings)
     assert found.world.surface_parameters == ("slope_deg=2", "direction_deg=0")
@@ -53,14 +56,14 @@ def test_a_list_with_spaces_arrives_in_the_scenario():
         ("track", "tow", "did you mean 'two'"),
     ],
 )
-def test_a_complaint_names_the_argument(name, value, says):
+def test_a_complaint_names_the_argument(name: str, value: str, says: str) -> None:
     with pytest.raises(FormationError) as error:
         scenario(**{name: value})
     assert says in str(error.value)
     assert "--set" not in str(error.value)
 
 
-def test_the_viewers_topics_are_remapped_into_the_namespace():
+def test_the_viewers_topics_are_remapped_into_the_namespace() -> None:
     found = dict(rviz_remappings("/site"))
     assert {"/tf", "/tf_static", "/clock"} < set(found)
     assert all(there == f"/site{topic}" for topic, there in found.items())
@@ -68,7 +71,9 @@ def test_the_viewers_topics_are_remapped_into_the_namespace():
 
 
 @pytest.mark.parametrize("content", [None, "", "Visualization Manager: 3", "{a: 1, a: 2}"])
-def test_displays_that_are_missing_or_broken_are_told_in_one_line(tmp_path, monkeypatch, content):
+def test_displays_that_are_missing_or_broken_are_told_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str | None
+) -> None:
     file = tmp_path / "formation.rviz"
     monkeypatch.setattr(arguments, "rviz_config", lambda: file)
     if content is not None:

@@ -2,6 +2,9 @@
 
 import json
 import os
+import shutil
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,7 +23,7 @@ from synthetic_bag import STORE, text
 STRING = "std_msgs/msg/String"
 
 
-def write(path, **metadata):
+def write(path: Path, **metadata: Any) -> Path:
     with BagWriter(path) as writer:
         writer.add_topic("/words", STRING, TopicQos())
         writer.write("/words", bytes(STORE.serialize_cdr(text("hello"), STRING)), 5)
@@ -30,21 +33,23 @@ def write(path, **metadata):
 
 
 @pytest.fixture
-def cut_off(tmp_path):
+def cut_off(tmp_path: Path) -> Path:
     """A bag that was never renamed to its name, which is returned."""
     write(tmp_path / "bag").rename(tmp_path / "bag.partial")
     return tmp_path / "bag"
 
 
-def test_a_bag_that_was_cut_off_is_completed_under_its_name(cut_off):
+def test_a_bag_that_was_cut_off_is_completed_under_its_name(cut_off: Path) -> None:
     assert rescue(cut_off) == (cut_off, "")
     assert os.listdir(cut_off.parent) == ["bag"]
     with read_bag(cut_off) as bag:
         assert bag.message_count == 1
 
 
-def test_where_that_fails_it_stays_where_the_recorder_said_and_the_command_works(cut_off, monkeypatch):
-    def refuse(source, out):
+def test_where_that_fails_it_stays_where_the_recorder_said_and_the_command_works(
+    cut_off: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(source: Path, out: Path) -> None:
         raise BagError(f"{source}: no space left{recover_hint(source)}")
 
     monkeypatch.setattr(bag_rescue, "recover", refuse)
@@ -56,8 +61,8 @@ def test_where_that_fails_it_stays_where_the_recorder_said_and_the_command_works
     assert recover(partial, cut_off).messages == 1
 
 
-def test_a_system_error_leaves_it_there_too(cut_off, monkeypatch):
-    def refuse(source, out):
+def test_a_system_error_leaves_it_there_too(cut_off: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(source: Path, out: Path) -> None:
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr(bag_rescue, "recover", refuse)
@@ -66,11 +71,13 @@ def test_a_system_error_leaves_it_there_too(cut_off, monkeypatch):
     assert os.listdir(cut_off.parent) == ["bag.partial"]
 
 
-def test_a_completed_bag_is_there_although_what_it_was_made_of_cannot_be_removed(cut_off, monkeypatch):
-    def refuse(folder):
+def test_a_completed_bag_is_there_although_what_it_was_made_of_cannot_be_removed(
+    cut_off: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(folder: Path) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(bag_rescue.shutil, "rmtree", refuse)
+    monkeypatch.setattr(shutil, "rmtree", refuse)
     bag, problem = rescue(cut_off)
     assert bag == cut_off
     assert problem.startswith(f"{cut_off}.cut_off can't be removed: Permission denied")
@@ -78,11 +85,11 @@ def test_a_completed_bag_is_there_although_what_it_was_made_of_cannot_be_removed
         assert opened.message_count == 1
 
 
-def test_no_bag_at_all_is_none(tmp_path):
+def test_no_bag_at_all_is_none(tmp_path: Path) -> None:
     assert rescue(tmp_path / "bag") == (None, "")
 
 
-def test_messages_that_were_lost_are_said_in_one_line(tmp_path):
+def test_messages_that_were_lost_are_said_in_one_line(tmp_path: Path) -> None:
     bag = write(tmp_path / "bag", lost={"/clock": 1, "/path": 3}, dropped={"/path": 2})
     assert missing_messages(bag) == "the bag lacks 6 messages that were lost on the way: /path (5), /clock (1)"
     many = write(tmp_path / "many", lost={f"/topic_{number}": 1 for number in range(7)})
@@ -90,14 +97,14 @@ def test_messages_that_were_lost_are_said_in_one_line(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["1e999", '{"a": NaN}', "[-Infinity]", "[" * 100_000, "9" * 5000])
-def test_what_is_no_strict_json_stays_a_text(text):
+def test_what_is_no_strict_json_stays_a_text(text: str) -> None:
     assert value(text) == text
 
 
 @pytest.mark.parametrize("lost", [5, ["/clock"], {"/clock": "many", "/path": None, "/tf": -1}])
-def test_counts_that_are_none_are_left_out(tmp_path, lost):
+def test_counts_that_are_none_are_left_out(tmp_path: Path, lost: dict[str, Any] | int | list[str]) -> None:
     assert missing_messages(write(tmp_path / "bag", lost=lost)) == ""
 
 
-def test_a_whole_bag_lacks_nothing(tmp_path):
+def test_a_whole_bag_lacks_nothing(tmp_path: Path) -> None:
     assert missing_messages(write(tmp_path / "bag")) == ""

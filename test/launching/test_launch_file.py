@@ -4,11 +4,13 @@ import importlib.util
 import os
 import shutil
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from graph_lab import Lab
 from graph_tools import alive
 from repository import ROOT
 from robot_formation.analysis.from_bag import load_run
@@ -21,7 +23,7 @@ DEADLINE_S = 120.0
 PROGRESS = 1  # the node beside those of the run
 
 
-def is_installed():
+def is_installed() -> bool:
     """Whether `ros2 launch` can find this package."""
     prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     marker = Path("share", "ament_index", "resource_index", "packages", "robot_formation")
@@ -34,16 +36,16 @@ needs_launch_testing = pytest.mark.skipif(
 )
 
 
-def start(lab, *arguments):
+def start(lab: Lab, *arguments: str) -> subprocess.Popen[str]:
     return lab.open(["ros2", "launch", "robot_formation", "formation.launch.py", *arguments], lab.environment)
 
 
-def children(pid):
+def children(pid: int) -> list[int]:
     """Process ids of a process's children."""
     return [int(text) for text in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
-def ended_cleanly(output):
+def ended_cleanly(output: str) -> int:
     """How many processes launch says have ended well, if it has not had to say anything else of one."""
     assert "process has died" not in output, output
     assert "escalating" not in output, output
@@ -51,7 +53,7 @@ def ended_cleanly(output):
 
 
 @needs_ros2
-def test_a_launched_run_ends_by_itself_and_leaves_its_bag(lab, tmp_path):
+def test_a_launched_run_ends_by_itself_and_leaves_its_bag(lab: Lab, tmp_path: Path) -> None:
     arguments = ("seed:=3", "camera:=on_demand", "set:=leader.timesteps=2", f"bag:={tmp_path / 'bag'}")
     output = "".join(start(lab, *arguments).communicate(timeout=DEADLINE_S))
     assert ended_cleanly(output) == len(processes(load_track("two"), tmp_path)) + PROGRESS
@@ -62,7 +64,7 @@ def test_a_launched_run_ends_by_itself_and_leaves_its_bag(lab, tmp_path):
 
 
 @needs_ros2
-def test_ctrl_c_ends_launch_and_every_node(lab):
+def test_ctrl_c_ends_launch_and_every_node(lab: Lab) -> None:
     nodes = {(process.executable, process.namespace) for process in processes(load_track("one"), None)}
     process = start(lab, "track:=one", "real_time_factor:=0.1")
     lab.until(lambda: nodes <= set(lab.node.get_node_names_and_namespaces()))
@@ -72,7 +74,7 @@ def test_ctrl_c_ends_launch_and_every_node(lab):
 
 
 @needs_ros2
-def test_a_misspelt_track_is_said(lab):
+def test_a_misspelt_track_is_said(lab: Lab) -> None:
     output = "".join(start(lab, "track:=tow").communicate(timeout=DEADLINE_S))
     assert "did you mean 'two'" in output
 
@@ -86,7 +88,7 @@ def test_a_misspelt_track_is_said(lab):
         ("images:=maybe", "'true', 'false'"),
     ],
 )
-def test_what_cannot_go_well_is_said_before_any_node_starts(lab, tmp_path, argument, says):
+def test_what_cannot_go_well_is_said_before_any_node_starts(lab: Lab, tmp_path: Path, argument: str, says: str) -> None:
     if "rviz" in argument and shutil.which("rviz2"):
         pytest.skip("this machine has rviz2")
     process = start(lab, argument.format(folder=tmp_path))
@@ -97,7 +99,7 @@ def test_what_cannot_go_well_is_said_before_any_node_starts(lab, tmp_path, argum
 
 
 @needs_ros2
-def test_launch_fails_when_a_node_dies_and_nothing_is_left(lab, tmp_path):
+def test_launch_fails_when_a_node_dies_and_nothing_is_left(lab: Lab, tmp_path: Path) -> None:
     process = start(lab, "seed:=3", "real_time_factor:=0.1", f"bag:={tmp_path / 'bag'}")
     nodes = {(each.executable, each.namespace) for each in processes(load_track("two"), tmp_path)}
     lab.until(lambda: nodes <= set(lab.node.get_node_names_and_namespaces()))
@@ -135,7 +137,7 @@ def generate_launch_description():
 
 
 @needs_ros2
-def test_two_formations_below_pushed_namespaces_end_well_and_give_the_same_run(lab, tmp_path):
+def test_two_formations_below_pushed_namespaces_end_well_and_give_the_same_run(lab: Lab, tmp_path: Path) -> None:
     file = tmp_path / "two.launch.py"
     file.write_text(TWO_SITES.format(folder=tmp_path, file=share_dir() / "launch" / "formation.launch.py"))
     environment = {name: text for name, text in lab.environment.items() if name != "ROS_AUTOMATIC_DISCOVERY_RANGE"}
@@ -150,7 +152,7 @@ def test_two_formations_below_pushed_namespaces_end_well_and_give_the_same_run(l
 
 
 @needs_launch_testing
-def test_the_launch_test_passes(lab):
+def test_the_launch_test_passes(lab: Lab) -> None:
     file = ROOT / "test" / "helpers" / "launch_formation.py"
     process = lab.open([sys.executable, "-m", "launch_testing.launch_test", str(file)], lab.environment)
     output = "".join(process.communicate(timeout=DEADLINE_S))

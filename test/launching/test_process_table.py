@@ -3,7 +3,10 @@
 import importlib.util
 import sys
 import types
+from collections.abc import Mapping
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -18,29 +21,31 @@ RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 class Recorded:
     """Stands in for the launch actions: keeps what it was made with."""
 
-    def __init__(self, *arguments, **options):
+    def __init__(self, *arguments: Any, **options: Any) -> None:
         self.arguments, self.options = arguments, options
 
-    def perform(self, context):
+    def perform(self, context: "Context") -> str:
         return context.arguments[self.arguments[0]]
 
 
 class Context:
     """Stands in for launch's context."""
 
-    def __init__(self, arguments, pushed="", environment=()):
+    def __init__(
+        self, arguments: Mapping[str, str], pushed: str = "", environment: Mapping[str, str] | None = None
+    ) -> None:
         self.arguments = arguments
         self.launch_configurations = {"ros_namespace": pushed} if pushed else {}
-        self.environment = dict(environment)
+        self.environment = dict(environment or {})
         self.locals = types.SimpleNamespace()
         self.is_shutdown = False
 
-    def extend_globals(self, values):
+    def extend_globals(self, values: Mapping[str, Any]) -> None:
         vars(self.locals).update(values)
 
 
 @pytest.fixture
-def launch_file(monkeypatch):
+def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """The launch file's module, with stand-ins for launch where no ROS install has it."""
     names = {
         "launch": ["LaunchContext", "LaunchDescription"],
@@ -58,32 +63,34 @@ def launch_file(monkeypatch):
         monkeypatch.setitem(sys.modules, name, module)
     path = share_dir() / "launch" / "formation.launch.py"
     spec = importlib.util.spec_from_file_location("formation_launch", path)
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-def context_of(launch_file, options=None, **arguments):
+def context_of(launch_file: ModuleType, options: dict[str, Any] | None = None, **arguments: str) -> Context:
     """What launch hands to the launch file when a user gives these arguments."""
     values = {name: argument.default for name, argument in launch_file.ARGUMENTS.items()} | arguments
     return Context(values, **(options or {}))
 
 
-def started(launch_file, options=None, **arguments):
+def started(launch_file: ModuleType, options: dict[str, Any] | None = None, **arguments: str) -> list[dict[str, Any]]:
     """The options of the Node actions."""
     return [node.options for node in launch_file.nodes(context_of(launch_file, options, **arguments))]
 
 
-def launched(launch_file, **arguments):
+def launched(launch_file: ModuleType, **arguments: str) -> list[tuple[str, str, dict[str, Any]]]:
     """What the launch file starts: executable, namespace and parameters of each node of the run."""
     return [
         (options["executable"], options["namespace"], options["parameters"][0])
-        for options in started(launch_file, **arguments)
+        for options in started(launch_file, None, **arguments)
         if options["executable"] != "progress"
     ]
 
 
-def test_both_start_the_same_nodes(launch_file, tmp_path):
+def test_both_start_the_same_nodes(launch_file: ModuleType, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     scenario = scenarios.override(
         scenarios.load_track("one"), ["seed=3", "predictor.name=literal", "predictor.forgetting=0.9", "followers=2"]
@@ -116,13 +123,13 @@ def test_both_start_the_same_nodes(launch_file, tmp_path):
     ]
 
 
-def test_a_launch_without_bag_has_no_recorder_and_waits_for_none(launch_file):
+def test_a_launch_without_bag_has_no_recorder_and_waits_for_none(launch_file: ModuleType) -> None:
     nodes = launched(launch_file)
     assert "recorder" not in {executable for executable, _, _ in nodes}
     assert {parameters["recorder"] for _, _, parameters in nodes} == {""}
 
 
-def test_a_scenario_file_and_a_surface_are_taken(launch_file, tmp_path):
+def test_a_scenario_file_and_a_surface_are_taken(launch_file: ModuleType, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("leader: {timesteps: 7}")
     found = launched(launch_file, scenario=str(file), surface="plane")
@@ -132,12 +139,12 @@ def test_a_scenario_file_and_a_surface_are_taken(launch_file, tmp_path):
 
 
 @pytest.fixture
-def with_rviz(launch_file, monkeypatch):
+def with_rviz(launch_file: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine that has rviz2."""
     monkeypatch.setattr(launch_file, "get_package_prefix", lambda name: f"/opt/{name}")
 
 
-def test_rviz_is_started_beside_the_nodes_and_does_not_end_the_run(launch_file, with_rviz):
+def test_rviz_is_started_beside_the_nodes_and_does_not_end_the_run(launch_file: ModuleType, with_rviz: None) -> None:
     (viewer,) = started(launch_file, rviz="true")[len(started(launch_file)) :]
     assert viewer["package"] == viewer["executable"] == "rviz2"
     assert Path(viewer["arguments"][1]).is_file()
@@ -146,7 +153,7 @@ def test_rviz_is_started_beside_the_nodes_and_does_not_end_the_run(launch_file, 
     assert all("on_exit" in options for options in started(launch_file))
 
 
-def test_rviz_looks_into_the_formations_namespace(launch_file, with_rviz):
+def test_rviz_looks_into_the_formations_namespace(launch_file: ModuleType, with_rviz: None) -> None:
     viewer = started(launch_file, {"pushed": "site"}, rviz="true", namespace="a")[-1]
     remappings = dict(viewer["remappings"])
     assert remappings["/surface"] == "/site/a/surface"
@@ -154,18 +161,20 @@ def test_rviz_looks_into_the_formations_namespace(launch_file, with_rviz):
     assert remappings["/leader/robot_description"] == "/site/a/leader/robot_description"
 
 
-def test_without_rviz2_nothing_is_started_and_that_is_said(launch_file, monkeypatch, tmp_path):
+def test_without_rviz2_nothing_is_started_and_that_is_said(
+    launch_file: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
     with pytest.raises(FormationError, match="rviz:=true needs the package rviz2, which is not installed"):
         started(launch_file, rviz="true")
 
 
-def test_a_bag_that_exists_is_refused_before_anything_is_started(launch_file, tmp_path):
+def test_a_bag_that_exists_is_refused_before_anything_is_started(launch_file: ModuleType, tmp_path: Path) -> None:
     with pytest.raises(FormationError, match="exists already"):
         started(launch_file, bag=str(tmp_path))
 
 
-def test_every_launch_argument_is_declared_with_its_choices(launch_file):
+def test_every_launch_argument_is_declared_with_its_choices(launch_file: ModuleType) -> None:
     (declared,) = launch_file.generate_launch_description().arguments
     *arguments, nodes = declared
     assert [action.arguments[0] for action in arguments] == list(launch_file.ARGUMENTS)
@@ -184,13 +193,13 @@ def test_every_launch_argument_is_declared_with_its_choices(launch_file):
     ],
 )
 def test_discovery_stays_here_unless_told_otherwise_and_only_the_nodes_are_told(
-    launch_file, exported, argument, expected
-):
+    launch_file: ModuleType, exported: dict[str, str], argument: str, expected: dict[str, str]
+) -> None:
     nodes = started(launch_file, {"environment": exported}, discovery_range=argument)
     assert [options["additional_env"] for options in nodes] == [expected] * len(nodes)
 
 
-def test_names_are_relative_so_that_a_pushed_namespace_comes_first(launch_file, tmp_path):
+def test_names_are_relative_so_that_a_pushed_namespace_comes_first(launch_file: ModuleType, tmp_path: Path) -> None:
     bag = str(tmp_path / "bag")
     assert {options["namespace"] for options in started(launch_file, bag=bag)} == {"", "leader", "follower_1"}
     namespaces = {options["namespace"] for options in started(launch_file, bag=bag, namespace="site_a")}
@@ -200,11 +209,11 @@ def test_names_are_relative_so_that_a_pushed_namespace_comes_first(launch_file, 
 class Ended:
     """Stands in for launch's event of a process's end."""
 
-    def __init__(self, returncode):
+    def __init__(self, returncode: int) -> None:
         self.returncode = returncode
 
 
-def ends(launch_file, context, nodes, codes):
+def ends(launch_file: ModuleType, context: Context, nodes: list[Any], codes: dict[str, int]) -> list[Any]:
     """Let processes end in this order, all others well; return the names of the actions that follow, with arguments."""
     handlers = {options["executable"]: options["on_exit"] for options in nodes}
     order = [*codes, *(name for name in handlers if name not in codes)]
@@ -220,7 +229,9 @@ def ends(launch_file, context, nodes, codes):
         ({"world": -9}, "OpaqueFunction", "outcome: incomplete (world was killed by SIGKILL)"),
     ],
 )
-def test_the_first_end_ends_the_run_and_the_last_one_says_how_it_went(launch_file, codes, last, says):
+def test_the_first_end_ends_the_run_and_the_last_one_says_how_it_went(
+    launch_file: ModuleType, codes: dict[str, int], last: str, says: str
+) -> None:
     context = context_of(launch_file)
     nodes = [node.options for node in launch_file.nodes(context)]
     nodes = [options for options in nodes if options["namespace"] != "leader" or options["executable"] == "leader"]
@@ -234,7 +245,7 @@ def test_the_first_end_ends_the_run_and_the_last_one_says_how_it_went(launch_fil
     assert told == [says]
 
 
-def test_of_two_runs_the_first_leaves_the_other_alone_and_a_failure_is_told_at_the_end(launch_file):
+def test_of_two_runs_the_first_leaves_the_other_alone_and_a_failure_is_told_at_the_end(launch_file: ModuleType) -> None:
     context = context_of(launch_file)
     for _ in range(2):
         launch_file.nodes(context)
@@ -250,7 +261,7 @@ def test_of_two_runs_the_first_leaves_the_other_alone_and_a_failure_is_told_at_t
         launch_file.fail(context, *actions[1].options["args"])
 
 
-def test_parameters_survive_the_way_through_a_ros_parameter_file(tmp_path):
+def test_parameters_survive_the_way_through_a_ros_parameter_file(tmp_path: Path) -> None:
     import yaml
 
     for process in processes(scenarios.load_track("two"), Path("bag")):
@@ -258,12 +269,12 @@ def test_parameters_survive_the_way_through_a_ros_parameter_file(tmp_path):
         assert yaml.safe_load(text)["/**"]["ros__parameters"] == process.ros_parameters()
 
 
-def test_without_the_overhead_camera_its_tracker_is_not_started():
+def test_without_the_overhead_camera_its_tracker_is_not_started() -> None:
     scenario = scenarios.override(scenarios.load_track("two"), ["world.overhead.enabled=false"])
     assert "overhead_tracker" not in {process.executable for process in processes(scenario, None)}
 
 
-def test_a_formation_in_a_namespace_lies_there_as_a_whole(tmp_path):
+def test_a_formation_in_a_namespace_lies_there_as_a_whole(tmp_path: Path) -> None:
     scenario = scenarios.load_track("two")
     placed = [process.name for process in processes(scenario, tmp_path / "bag", namespace="/site_a")]
     assert placed == [f"/site_a{process.name}" for process in processes(scenario, tmp_path / "bag")]

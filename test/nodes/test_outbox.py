@@ -1,6 +1,8 @@
 """Who counts as a listener in place of the one that is expected."""
 
+from collections.abc import Sequence
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -13,14 +15,14 @@ class Listeners:
 
     topic_name = "/follower_1/displacement"
 
-    def __init__(self, *names):
+    def __init__(self, *names: str) -> None:
         self._names = names
 
-    def get_subscriptions_info_by_topic(self, topic):
+    def get_subscriptions_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
         assert topic == self.topic_name
         return [SimpleNamespace(node_name=name, node_namespace="/follower_1") for name in self._names]
 
-    def get_subscription_count(self):
+    def get_subscription_count(self) -> int:
         return len(self._names)
 
 
@@ -36,8 +38,10 @@ class Listeners:
         (("progress", "predictor"), True, True),
     ],
 )
-def test_only_a_node_of_the_users_stands_in_for_the_predictor(subscribers, matched, stood_in):
-    node = Listeners(*subscribers)
+def test_only_a_node_of_the_users_stands_in_for_the_predictor(
+    subscribers: Sequence[str], matched: bool, stood_in: bool
+) -> None:
+    node: Any = Listeners(*subscribers)
     outbox = Outbox(node, patience_s=60.0, recorder="", record_images=False, warn=lambda text: None)
     outbox.add(DISPLACEMENT, node)
     assert outbox._matched(DISPLACEMENT) == matched

@@ -10,7 +10,7 @@ from repository import ROOT
 CITATION = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
 
 
-def test_the_software_is_what_is_cited():
+def test_the_software_is_what_is_cited() -> None:
     assert CITATION["cff-version"] == "1.2.0"
     assert CITATION["type"] == "software"
     assert CITATION["authors"] == [{"name": "robot_formation maintainers"}]
@@ -22,7 +22,7 @@ def test_the_software_is_what_is_cited():
     assert "preferred-citation" not in CITATION
 
 
-def test_the_paper_is_a_reference():
+def test_the_paper_is_a_reference() -> None:
     (paper,) = CITATION["references"]
     assert paper["type"] == "article"
     assert [author["family-names"] for author in paper["authors"]] == ["Wang", "Baba", "Hikihara"]
@@ -30,7 +30,7 @@ def test_the_paper_is_a_reference():
     assert paper["year"] == 2022
 
 
-def test_the_readme_has_bibtex_of_both():
+def test_the_readme_has_bibtex_of_both() -> None:
     (text,) = re.findall(r"```bibtex\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
     software, paper = (part for part in re.split(r"(?=^@)", text, flags=re.MULTILINE) if part)
     assert software.startswith("@software{")
@@ -41,8 +41,8 @@ def test_the_readme_has_bibtex_of_both():
     for author in reference["authors"]:
         assert f"{author['family-names']}, {author['given-names']}" in paper
 
-    def plain(title):
+    def plain(title: str) -> str:
         return re.sub(r"[{}\\\\]", "", title)
 
-    assert plain(re.search(r"title += \{(.*)\},", paper)[1]) == reference["title"]
-    assert plain(re.search(r"title += \{(.*)\},", software)[1]) == CITATION["title"]
+    assert plain(re.findall(r"title += \{(.*)\},", paper)[0]) == reference["title"]
+    assert plain(re.findall(r"title += \{(.*)\},", software)[0]) == CITATION["title"]

@@ -5,11 +5,12 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
-from graph_lab import open_lab
+from graph_lab import Lab, open_lab
 from repository import ROOT
 from robot_formation.bag.writer import BagWriter
 from robot_formation.components.catalogue import KINDS
@@ -26,7 +27,7 @@ PATH = f"{BIN}{os.pathsep}{os.environ.get('PATH', '')}"
 NODES = [*KINDS, "recorder", "player", "progress"]
 
 
-def run_colcon(workspace, *arguments):
+def run_colcon(workspace: Path, *arguments: str) -> str:
     """Call colcon in a workspace as a user does; returns what it prints."""
     colcon = shutil.which("colcon", path=PATH)
     if colcon is None:
@@ -39,7 +40,7 @@ def run_colcon(workspace, *arguments):
 
 
 @pytest.fixture(scope="module")
-def workspace(tmp_path_factory):
+def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A workspace with this source, built."""
     listed = subprocess.run(["git", "ls-files", "-coz", "--exclude-standard"], cwd=ROOT, capture_output=True)
     if listed.returncode != 0:
@@ -55,13 +56,13 @@ def workspace(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def installed(workspace):
+def installed(workspace: Path) -> Path:
     """The package's install folder."""
     return workspace / "install" / "robot_formation"
 
 
 @pytest.fixture(scope="module")
-def sourced(workspace):
+def sourced(workspace: Path) -> dict[str, str]:
     """The environment of a shell that has sourced the workspace, with the ROS of this Python under it."""
     underlay = {**os.environ, "PATH": PATH}
     underlay.setdefault("AMENT_PREFIX_PATH", sys.prefix)
@@ -70,7 +71,7 @@ def sourced(workspace):
     return dict(entry.split("=", 1) for entry in result.stdout.split("\0") if "=" in entry)
 
 
-def ros2_run(environment, package, executable):
+def ros2_run(environment: Mapping[str, str], package: str, executable: str) -> Path:
     """The path that `ros2 run` starts: an executable below lib/PACKAGE of the first prefix that has the package."""
     for prefix in map(Path, environment["AMENT_PREFIX_PATH"].split(os.pathsep)):
         if (prefix / "share" / "ament_index" / "resource_index" / "packages" / package).is_file():
@@ -80,13 +81,13 @@ def ros2_run(environment, package, executable):
     raise AssertionError(f"no package {package}")
 
 
-def test_each_node_and_the_command_become_executables(installed):
+def test_each_node_and_the_command_become_executables(installed: Path) -> None:
     folder = installed / "lib" / "robot_formation"
     assert {*NODES, "formation"} <= {file.name for file in folder.iterdir()}
     assert all(os.access(file, os.X_OK) for file in folder.iterdir())
 
 
-def test_config_launch_and_the_index_marker_are_installed(installed):
+def test_config_launch_and_the_index_marker_are_installed(installed: Path) -> None:
     share = installed / "share"
     assert (share / "ament_index" / "resource_index" / "packages" / "robot_formation").is_file()
     for folder in ("config", "launch"):
@@ -99,7 +100,7 @@ def test_config_launch_and_the_index_marker_are_installed(installed):
         assert all((share / "robot_formation" / file).is_file() for file in here)
 
 
-def test_the_installed_command_starts_and_finds_what_was_installed_with_it(installed, tmp_path):
+def test_the_installed_command_starts_and_finds_what_was_installed_with_it(installed: Path, tmp_path: Path) -> None:
     (site_packages,) = installed.glob("lib/python3*/site-packages")
     environment = {**os.environ, "PATH": PATH, "PYTHONPATH": str(site_packages)}
     command = [str(installed / "lib" / "robot_formation" / "formation"), "doctor", "--json"]
@@ -108,27 +109,30 @@ def test_the_installed_command_starts_and_finds_what_was_installed_with_it(insta
     assert str(installed / "share" / "robot_formation" / "config") in result.stdout
 
 
-def test_colcon_test_finds_the_tests_and_the_linters(workspace):
+def test_colcon_test_finds_the_tests_and_the_linters(workspace: Path) -> None:
     chosen = ["test/test_parameters.py", "test/package/test_linters.py", " -k", "ruff or parameter"]
     run_colcon(workspace, "test", "--packages-select", "robot_formation", "--pytest-args", *chosen)
     summary = run_colcon(workspace, "test-result", "--all", "--verbose").splitlines()
     (line,) = [line for line in summary if "pytest.xml" in line]
-    counts = dict(reversed(part.split()) for part in line.partition(": ")[2].split(", "))
+    parts = [part.split() for part in line.partition(": ")[2].split(", ")]
+    counts = {name: count for count, name in parts}
     assert (counts["errors"], counts["failures"]) == ("0", "0")
     assert int(counts["tests"]) > 10
 
 
 @pytest.mark.graph
-def test_ros2_run_finds_every_node_which_takes_ros_arguments_and_ends_on_ctrl_c(sourced, installed, tmp_path):
+def test_ros2_run_finds_every_node_which_takes_ros_arguments_and_ends_on_ctrl_c(
+    sourced: dict[str, str], installed: Path, tmp_path: Path
+) -> None:
     needed = {
         "recorder": ["-p", f"path:={tmp_path / 'bag'}"],
         "player": ["-p", f"bag:={tmp_path / 'first'}", "-p", "wait_s:=600.0"],
     }
     with BagWriter(tmp_path / "first") as writer:
         SyntheticRun(writer)
-    with open_lab(tmp_path) as lab:
+    with open_lab(tmp_path, Lab) as lab:
         environment = {**lab.environment, **sourced, "ROS_DOMAIN_ID": str(lab.domain)}
-        started = {}
+        started: dict[tuple[str, str], subprocess.Popen[str]] = {}
         for node in NODES:
             namespace = "/follower_1" if node in KINDS and KINDS[node].robots else "/"
             config = installed / "share" / "robot_formation" / "config" / f"{node}.yaml"

@@ -6,6 +6,8 @@ import json
 import re
 import shlex
 from dataclasses import fields, replace
+from pathlib import Path
+from types import ModuleType
 
 import pytest
 from test_layers import LAYERS
@@ -16,13 +18,14 @@ from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.report import text_report
 from robot_formation.cli.main import VERBS, make_parser
 from robot_formation.cli.main import main as command_line
-from robot_formation.components.base import Place
+from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.follower.fine_tuning import LookParameters
 from robot_formation.launching.arguments import ARGUMENTS
 from robot_formation.launching.watchdog import Watchdog
+from robot_formation.names import Qos, Topic
 from robot_formation.parameters import specs
 
 NODE_PAGES = ROOT / "docs" / "reference" / "nodes"
@@ -49,8 +52,10 @@ BOXES = {
 }
 
 
-def make_tables():
+def make_tables() -> ModuleType:
     spec = importlib.util.spec_from_file_location("make_tables", ROOT / "docs" / "make_parameter_tables.py")
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -59,12 +64,12 @@ def make_tables():
 TABLES = make_tables()
 
 
-def component(kind, robot):
+def component(kind: str, robot: str) -> Component:
     entry = KINDS[kind]
     return entry.component_class()(load_track("two").of_robot(entry, robot), Place(robot))
 
 
-def as_documented(topic, kind, robot):
+def as_documented(topic: Topic, kind: str, robot: str) -> str:
     """A topic's name as the page of its node writes it, whichever robot the node belongs to."""
     name = topic.name
     if kind == "fine_tuner":
@@ -77,12 +82,12 @@ def as_documented(topic, kind, robot):
     return name
 
 
-def qos_name(qos):
+def qos_name(qos: Qos) -> str:
     return next(name for name, known in QOS.items() if known == qos)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_nodes_page_lists_exactly_its_topics_with_type_and_qos(kind):
+def test_a_nodes_page_lists_exactly_its_topics_with_type_and_qos(kind: str) -> None:
     robot = KINDS[kind].robots_of(1)[0]
     built = component(kind, robot)
     listened = [replace(i.topic, qos=replace(i.topic.qos, durability="volatile")) for i in built.inputs()]
@@ -95,7 +100,7 @@ def test_a_nodes_page_lists_exactly_its_topics_with_type_and_qos(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_nodes_page_names_its_services_and_diagnostics(kind):
+def test_a_nodes_page_names_its_services_and_diagnostics(kind: str) -> None:
     built = component(kind, KINDS[kind].robots_of(1)[0])
     page = (NODE_PAGES / f"{kind}.md").read_text()
     for name in [*built.services(), *built.details()]:
@@ -105,7 +110,9 @@ def test_a_nodes_page_names_its_services_and_diagnostics(kind):
 @pytest.mark.parametrize(
     ("node", "modules"), [("recorder", ("recorder_node", "recorder_health")), ("player", ("player_node",))]
 )
-def test_the_pages_of_recorder_and_player_name_what_these_make_beside_a_bags_topics(node, modules):
+def test_the_pages_of_recorder_and_player_name_what_these_make_beside_a_bags_topics(
+    node: str, modules: tuple[str, ...]
+) -> None:
     code = "".join((PACKAGE / "nodes" / node / f"{module}.py").read_text() for module in modules)
     page = (NODE_PAGES / f"{node}.md").read_text()
     for kind, name in re.findall(r'create_service\((\w+), "([^"]+)"', code):
@@ -117,7 +124,7 @@ def test_the_pages_of_recorder_and_player_name_what_these_make_beside_a_bags_top
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_node_pages_have_one_shape(name):
+def test_node_pages_have_one_shape(name: str) -> None:
     page = (NODE_PAGES / f"{name}.md").read_text()
     title, *sections = re.findall(r"^##? (.+)$", re.sub(r"```.*?```", "", page, flags=re.DOTALL), re.MULTILINE)
     assert title == name
@@ -127,7 +134,7 @@ def test_node_pages_have_one_shape(name):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_topics_of_poses_pictures_and_blocks_name_their_frame(kind):
+def test_topics_of_poses_pictures_and_blocks_name_their_frame(kind: str) -> None:
     stamped = r"(geometry|nav|sensor)_msgs/msg/(?!JointState)"
     rows = re.findall(
         rf"^\| (?:reads|writes) \| `([^`]+)` \| {stamped}\w+ \| \w+ \| (.*?) \|",
@@ -138,19 +145,19 @@ def test_topics_of_poses_pictures_and_blocks_name_their_frame(kind):
 
 
 @pytest.mark.parametrize("name", [*NODES, "common"])
-def test_a_pages_parameter_table_is_up_to_date(name):
+def test_a_pages_parameter_table_is_up_to_date(name: str) -> None:
     before, after = TABLES.updated(name, TABLES.parameter_classes()[name])
     assert before == after, "run python docs/make_parameter_tables.py"
 
 
 @pytest.mark.parametrize("name", NODES)
-def test_every_parameter_of_a_node_is_on_its_page(name):
+def test_every_parameter_of_a_node_is_on_its_page(name: str) -> None:
     parameters = TABLES.parameter_classes()[name]
     page = (NODE_PAGES / f"{name}.md").read_text()
     assert [parameter for parameter in specs(parameters) if f"\n| `{parameter}` |" not in page] == []
 
 
-def test_the_qos_table_says_what_the_profiles_are():
+def test_the_qos_table_says_what_the_profiles_are() -> None:
     page = (NODE_PAGES / "common.md").read_text()
     for name, qos in QOS.items():
         assert len(fields(qos)) == 4
@@ -158,8 +165,8 @@ def test_the_qos_table_says_what_the_profiles_are():
         assert f"| {name} | {qos.reliability} | {qos.durability.replace('_', ' ')} | {history} |" in page
 
 
-def test_the_readmes_graph_is_the_real_one():
-    def absolute(robot, topic):
+def test_the_readmes_graph_is_the_real_one() -> None:
+    def absolute(robot: str, topic: Topic) -> str:
         name = topic.name
         return name if name.startswith("/") else names.under(f"/{robot}" if robot else "", name)
 
@@ -179,7 +186,7 @@ def test_the_readmes_graph_is_the_real_one():
     assert drawn == expected
 
 
-def test_the_readme_links_to_every_node_and_names_every_verb():
+def test_the_readme_links_to_every_node_and_names_every_verb() -> None:
     readme = (ROOT / "README.md").read_text()
     for node in NODES:
         assert f"](docs/reference/nodes/{node}.md)" in readme
@@ -188,23 +195,23 @@ def test_the_readme_links_to_every_node_and_names_every_verb():
         assert re.search(rf"^\| `{name}\b", readme, re.MULTILINE)
 
 
-def test_the_pages_scenario_can_be_loaded(tmp_path):
+def test_the_pages_scenario_can_be_loaded(tmp_path: Path) -> None:
     from robot_formation.experiment.scenario import load
 
-    text = re.search(r"```yaml\n(.*?)```", (ROOT / "docs" / "how-to" / "scenarios.md").read_text(), re.DOTALL)[1]
+    text = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "how-to" / "scenarios.md").read_text(), re.DOTALL)[0]
     (tmp_path / "scenario.yaml").write_text(text)
     load(tmp_path / "scenario.yaml").check()
 
 
-def test_the_installations_launch_arguments_are_those_of_the_launch_file():
-    command = re.search(r"ros2 launch .*\\\n.*", (ROOT / "docs" / "how-to" / "installation.md").read_text())[0]
+def test_the_installations_launch_arguments_are_those_of_the_launch_file() -> None:
+    command = re.findall(r"ros2 launch .*\\\n.*", (ROOT / "docs" / "how-to" / "installation.md").read_text())[0]
     used = re.findall(r"(\w+):=", command)
     assert used
     assert set(used) <= set(ARGUMENTS)
 
 
-def test_the_readmes_python_example_runs(capsys):
-    text = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)[1]
+def test_the_readmes_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    text = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)[0]
     exec(compile(text, "README.md", "exec"), {})
     *timesteps, last = capsys.readouterr().out.splitlines()
     assert len(timesteps) == 4
@@ -213,14 +220,14 @@ def test_the_readmes_python_example_runs(capsys):
     assert 0.0 <= float(correction_m) < 0.1
 
 
-def anchors(page):
+def anchors(page: Path) -> set[str]:
     """Anchors that GitHub makes of a page's headings."""
     headings = re.findall(r"^#+ (.+)$", re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_relative_links_lead_somewhere(page):
+def test_relative_links_lead_somewhere(page: Path) -> None:
     broken = []
     for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if re.match(r"[a-z]+:", link):

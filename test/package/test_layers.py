@@ -83,16 +83,16 @@ def reachable(module: str) -> set[str]:
     return seen
 
 
-def test_every_part_of_the_package_has_its_layer():
+def test_every_part_of_the_package_has_its_layer() -> None:
     assert {area_of(module) for module in GRAPH} <= set(LEVEL)
 
 
-def test_imports_run_downward_only():
+def test_imports_run_downward_only() -> None:
     pairs = {(module, name) for module, names in OWN.items() for name in names}
     assert not {(module, name) for module, name in pairs if LEVEL[area_of(name)] > LEVEL[area_of(module)]}
 
 
-def test_no_modules_import_each_other_in_a_circle_lazily_or_not():
+def test_no_modules_import_each_other_in_a_circle_lazily_or_not() -> None:
     graph = {module: {name for name in names if name in OWN} for module, names in RUNTIME.items()}
     try:
         list(TopologicalSorter(graph).static_order())
@@ -100,24 +100,24 @@ def test_no_modules_import_each_other_in_a_circle_lazily_or_not():
         pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
 
 
-def test_only_nodes_and_conversions_import_ros():
+def test_only_nodes_and_conversions_import_ros() -> None:
     importers = {module for module, names in GRAPH.items() if any(ROS.fullmatch(n.split(".")[0]) for n in names)}
     assert {area_of(module) for module in importers} <= {"nodes", "conversions"}
 
 
-def test_only_the_world_imports_pybullet():
+def test_only_the_world_imports_pybullet() -> None:
     importers = {module for module, names in GRAPH.items() if any(n.split(".")[0] == "pybullet" for n in names)}
     assert {area_of(module) for module in importers} <= {"world"}
 
 
-def test_yaml_is_parsed_in_one_place():
+def test_yaml_is_parsed_in_one_place() -> None:
     parses = re.compile(r"\byaml\.(\w*load\w*|parse|scan|compose\w*|\w*Loader)\b")
     files = [*FILES, *(PACKAGE.parent / "launch").glob("*.py")]
     assert {file.name for file in files if parses.search(file.read_text())} == {"yaml_files.py"}
 
 
 @pytest.mark.parametrize("area", [room for (room,) in LAYERS[1 : LAYERS.index(("conversions",))]])
-def test_these_parts_need_no_ros_not_even_indirectly(area):
+def test_these_parts_need_no_ros_not_even_indirectly(area: str) -> None:
     modules = [module for module in GRAPH if area_of(module) == area]
     assert modules
     for module in modules:
