@@ -91,7 +91,7 @@ def test_every_requirement_has_a_rosdep_key_that_brings_it(package_xml, setup_ar
         "python3-opencv": {"opencv-python-headless"},
         "python3-pil": {"pillow"},
         "python3-yaml": {"PyYAML"},
-        **{f"python3-{name}": {name} for name in ("joblib", "matplotlib", "numpy")},
+        **{f"python3-{name}": {name} for name in ("joblib", "matplotlib", "numpy", "scipy")},
         **{f"python3-{name}-pip": {name} for name in ("pybullet", "rosbags")},
     }
     keys = {element.text for element in package_xml.iter("exec_depend")}
