@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.alignment_grid import equipment
+from alignment_grid import equipment
 from robot_formation import exit_codes
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.quantities import analyse
