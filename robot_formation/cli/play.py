@@ -71,14 +71,15 @@ def run(args: argparse.Namespace) -> int:
         if bag.recovered:
             _say(f"{args.bag} was not closed: what can be saved of it is played")
         selection.check(bag.topics, args.bag)
-        from robot_formation.nodes.host.session import Interrupts, node_session
+        from robot_formation.nodes.host.session import node_session
         from robot_formation.nodes.player.player_node import PlayerNode
+        from robot_formation.system.signal_handling import SignalCounter
 
         parameters = _parameters(args)
-        with Interrupts() as interrupts, node_session("player") as node:
+        with SignalCounter(1) as signals, node_session("player") as node:
             player = PlayerNode(node, bag, parameters, warn=lambda text: _say(f"warning: {text}"))
             _say(f"playing {args.bag}: {bag.message_count} messages, {bag.duration_s:.3f} s")
-            report = player.run(interrupts)
+            report = player.run(signals.came)
     _tell(args, report)
     if report.interrupted:
         _say("formation play: interrupted")

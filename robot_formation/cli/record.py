@@ -93,16 +93,18 @@ def default_bag() -> PathReservation:
 
 
 def _record(args: argparse.Namespace, path: Path) -> RecordReport:
-    from robot_formation.bag.provenance import git_commit, versions
-    from robot_formation.nodes.host.session import Interrupts, node_session
+    from robot_formation.bag.provenance import versions
+    from robot_formation.nodes.host.session import node_session
     from robot_formation.nodes.recorder.recorder_node import RecorderNode
+    from robot_formation.system.git_commit import git_commit
+    from robot_formation.system.signal_handling import SignalCounter
 
     texts = {"versions": json.dumps(versions()), "git_commit": git_commit()}
     parameters = _parameters(args, path, tuple(f"{key}={text}" for key, text in texts.items()))
-    with Interrupts() as interrupts, node_session("recorder") as node:
+    with SignalCounter(1) as signals, node_session("recorder") as node:
         recorder = RecorderNode(node, parameters, say=_say, warn=_warn, ask=True)
         _say(f"recording into {path}; Ctrl-C ends")
-        return recorder.run(interrupts)
+        return recorder.run(signals.came)
 
 
 def _parameters(args: argparse.Namespace, path: Path, metadata: tuple[str, ...]) -> RecorderParameters:

@@ -10,13 +10,14 @@ from robot_formation import conversions, names
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.message_recorder import METADATA_NAME
-from robot_formation.bag.provenance import git_commit, versions
+from robot_formation.bag.provenance import versions
 from robot_formation.bag.reader import Bag
 from robot_formation.bag.run_details import mapping, node_parameters
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import node_defaults
 from robot_formation.parameters import from_mapping, specs
+from robot_formation.system.git_commit import git_commit
 
 
 class Recording:
