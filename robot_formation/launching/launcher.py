@@ -65,8 +65,6 @@ class Launcher:
         images: whether pictures are recorded too.
         say: takes the lines of progress.
         silence_s: wall seconds in which no robot does anything, after which the run is given up; longer in slow motion.
-        callback_delay_s: longest random delay before each callback of every node (tests).
-        on_start: called once all processes run, with the ROS domain and the process ids by node name (tests).
         reservation: of the bag's path, if it has been taken already; it is released at the end.
     """
 
@@ -75,8 +73,6 @@ class Launcher:
     images: bool = False
     say: Callable[[str], None] = lambda text: None
     silence_s: float = 90.0
-    callback_delay_s: float = 0.0
-    on_start: Callable[[int, dict[str, int]], None] | None = None
     reservation: PathReservation | None = None
     _children: list[Child] = field(default_factory=list, init=False)
     _signals: SignalCounter = field(default_factory=SignalCounter, init=False)
@@ -117,12 +113,7 @@ class Launcher:
         for process in table:
             if self._signals.count:
                 return
-            if self.callback_delay_s and process.executable != RECORDER:
-                delay = {"callback_delay_s": self.callback_delay_s}
-                process = type(process)(process.executable, process.namespace, {**process.parameters, **delay})
             self._children.append(Child(process, folder, environment))
-        if self.on_start is not None:
-            self.on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in self._children})
 
     def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""

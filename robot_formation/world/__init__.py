@@ -8,7 +8,6 @@ from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose, pose_on_surface
 from robot_formation.world.robot import RobotStart
 from robot_formation.world.sensor import Development, Sensor
-from robot_formation.world.state import WorldState
 from robot_formation.world.world import World
 
 __all__ = [
@@ -28,7 +27,6 @@ __all__ = [
     "World",
     "WorldError",
     "WorldParameters",
-    "WorldState",
     "marker_picture",
     "pose_on_surface",
 ]
