@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
 from robot_formation.batch.progress_line import with_progress
-from robot_formation.cli.parser import Names, whole_number
+from robot_formation.cli.option_types import Names, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:

@@ -47,7 +47,7 @@ class Recording:
 
     def has(self, robot: str, topic: names.Topic) -> bool:
         """Tell whether there are messages on a robot's topic."""
-        return absolute(robot, topic) in self._bag.topics
+        return topic.of(robot) in self._bag.topics
 
     def messages(self, robot: str, topic: names.Topic) -> Iterator[Any]:
         """Yield the messages of a robot's topic in the order in which they were sent.
@@ -55,7 +55,7 @@ class Recording:
         Raises:
             BagError: there are none, they have another type, or the bag is corrupted.
         """
-        name = absolute(robot, topic)
+        name = topic.of(robot)
         self._bag.require({name: topic.type})
         for message in self._bag.raw_messages([name]):
             try:
@@ -84,11 +84,6 @@ class Recording:
         known = {name: value for name, value in recorded.items() if name in specs(cls)}
         self.notes += [f"{kind}.{name} is no parameter any more" for name in recorded if name not in known]
         return from_mapping(cls, {**known, **changes}, where=kind)
-
-
-def absolute(robot: str, topic: names.Topic) -> str:
-    """Name a robot's topic in full."""
-    return names.absolute(f"/{robot}", topic.name)
 
 
 def host(kind: str, parameters: Any, robot: str, notes: list[str]) -> tuple[Component, list[tuple[str, Any]]]:

@@ -5,7 +5,8 @@ import argparse
 import pytest
 
 from robot_formation.cli.main import main
-from robot_formation.cli.parser import Names, Parser, number, whole_number
+from robot_formation.cli.option_types import Names, number, whole_number
+from robot_formation.cli.parser import Parser
 
 
 def ended(capsys, *arguments):
