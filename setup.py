@@ -54,6 +54,7 @@ setup(
         "pillow>=10.2.0",
         "pybullet>=3.2.6",
         "rosbags>=0.11.6",
+        "scipy>=1.11.4",
         "zstandard>=0.22.0",
     ],
     extras_require={
@@ -72,6 +73,7 @@ setup(
             "pytest>=7.4.4",
             "pytest-xdist",
             "ruff",
+            "scipy-stubs",
             "types-PyYAML",
         ],
     },

@@ -12,19 +12,17 @@ import os
 import sys
 from pathlib import Path
 
-from joblib import Parallel, delayed
-
 from alignment_grid import (
     equipment,
     faces_seen,
-    read_rows,
     run_start,
     starts,
     stratified,
     summarise,
-    write_rows,
+    table,
 )
-from robot_formation.cli.sweep import with_progress
+from robot_formation.batch.pool import run_parallel
+from robot_formation.batch.progress_line import with_progress
 from robot_formation.errors import FormationError
 
 LINES = (
@@ -47,7 +45,7 @@ def _pair(values, scale, digits):
 
 def attainable(jobs):
     made, grid = equipment("precise"), list(starts())
-    found = Parallel(n_jobs=jobs, batch_size=50)(delayed(faces_seen)(made, start) for start in grid)
+    found = run_parallel(faces_seen, ((made, start) for start in grid), jobs)
     return {start: faces for start, faces in zip(grid, found, strict=True) if faces}
 
 
@@ -56,17 +54,18 @@ def run(args):
     made = {mode: equipment(mode, args.set) for mode in modes}
     faces = attainable(args.jobs)
     print(f"{len(faces)} starts of the grid can be attained", file=sys.stderr)
-    rows = read_rows(args.out) if args.out.exists() else []
-    write_rows(args.out, rows, anew=True)
+    results = table(args.out)
+    rows = list(results.read()) if args.out.exists() else []
+    results.rewrite(rows)
     done = {(row.mode, row.seed) for row in rows}
     sample = stratified(faces, args.starts, args.seed)
     tasks = [(mode, start, seed) for start, seed in sample for mode in modes if (mode, seed) not in done]
-    pool = Parallel(n_jobs=args.jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
-    jobs = (delayed(run_start)(made[mode], mode, start, faces[start], seed) for mode, start, seed in tasks)
-    for row in with_progress(pool(jobs), len(tasks)):
-        write_rows(args.out, [row])
+    arguments = ((made[mode], mode, start, faces[start], seed) for mode, start, seed in tasks)
+    for row in with_progress(run_parallel(run_start, arguments, args.jobs), len(tasks)):
+        rows.append(row)
+        results.append([row])
     seeds = {seed for _, seed in sample}
-    summaries = [summarise([r for r in read_rows(args.out) if r.mode == m and r.seed in seeds]) for m in modes]
+    summaries = [summarise([r for r in rows if r.mode == m and r.seed in seeds]) for m in modes]
     print(f"{len(faces)} starts can be attained, {args.starts} alignments in each mode; median / 95 % point\n")
     print("| | " + " | ".join(modes) + " |\n|---|" + "---|" * len(modes))
     for name, cell in LINES:

@@ -5,17 +5,17 @@ Paper, "Visual fine-tuning process calibrations": relative positions -45..45 cm 
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from robot_formation.batch.resumable_table import ResumableTable
 from robot_formation.calibration.alignment_trial import (
     FOLLOWER,
     AlignmentTrial,
@@ -26,7 +26,6 @@ from robot_formation.calibration.alignment_trial import (
 )
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
-from robot_formation.system.files import whole_lines
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world.events import Frame
 from robot_formation.world.pose import Pose
@@ -173,32 +172,9 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     return summary
 
 
-def read_rows(path: Path) -> list[Row]:
-    """Read a table of alignments; a half-written last line is left out.
-
-    Raises:
-        FormationError: if the file is no such table.
-    """
-    kinds = {field.name: {"int": int, "float": float}.get(str(field.type), str) for field in fields(Row)}
-    reader = csv.reader(list(whole_lines(path)))
-    if next(reader, None) != list(kinds):
-        raise FormationError(f"{path}: no table of alignments; choose another file")
-    try:
-        return [
-            Row(**{name: kind(cell) for (name, kind), cell in zip(kinds.items(), cells, strict=True)})
-            for cells in reader
-        ]
-    except ValueError:
-        raise FormationError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
-
-
-def write_rows(path: Path, rows: Iterable[Row], *, anew: bool = False) -> None:
-    """Append rows to a table, or begin it."""
-    with path.open("w" if anew else "a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        if anew:
-            writer.writerow([field.name for field in fields(Row)])
-        writer.writerows(asdict(row).values() for row in rows)
+def table(path: Path) -> ResumableTable[Row]:
+    """Return a table of alignments."""
+    return ResumableTable(path, Row, FormationError, "no table of alignments; choose another file")
 
 
 def _flat(start: RobotStart) -> Pose:

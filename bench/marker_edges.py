@@ -14,7 +14,6 @@ from collections import defaultdict
 
 import cv2
 import numpy as np
-from joblib import Parallel, delayed
 
 from alignment_grid import equipment
 from robot_formation import names
@@ -27,6 +26,7 @@ from robot_formation.alignment.precise.marker_edges import (
     one_marker,
 )
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
+from robot_formation.batch.pool import run_parallel
 from robot_formation.calibration.alignment_trial import FOLLOWER, Start, poses
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world.checks import WorldError
@@ -128,8 +128,8 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     args = parser.parse_args()
     for title, place in (("near the formation", near), ("anywhere in view", anywhere)):
-        parts = (delayed(looks)(place, args.looks // 16, 16 * args.seed + part) for part in range(16))
-        found = [entry for part in Parallel(n_jobs=args.jobs)(parts) for entry in part]
+        parts = ((place, args.looks // 16, 16 * args.seed + part) for part in range(16))
+        found = [entry for part in run_parallel(looks, parts, args.jobs) for entry in part]
         edges, shown = errors(found)
         print(f"{title}: {len(found)} looks\n\n| edge | looks | mean error, px | scatter, px |\n|---|---|---|---|")
         for name, values in sorted(edges.items()):

@@ -24,11 +24,11 @@ import sys
 import time
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from robot_formation.alignment.paper_rules import TARGET
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.sweep_summary import median_with_interval
+from robot_formation.batch.pool import run_parallel
 from robot_formation.cli.sweep import seeds
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.experiment import scenario as scenarios
@@ -225,7 +225,7 @@ def one_run(track, mode, kind, predictor, seed):
 def runs(chosen, predictor, jobs):
     """Print whole runs with both sensors."""
     cases = list(itertools.product(("one", "two"), ("paper", "precise"), KINDS))
-    results = Parallel(n_jobs=jobs)(delayed(one_run)(*case, predictor, seed) for case in cases for seed in chosen)
+    results = list(run_parallel(one_run, ((*case, predictor, seed) for case in cases for seed in chosen), jobs))
     print(f"\npredictor {predictor}, {len(chosen)} seeds\n")
     print("| track | mode | marker | not finished | formation error (cm) | tags against colours | ", end="")
     print("heading error (deg) | correction (cm) | moves per timestep | out of view (found again) | ms per frame |")

@@ -55,6 +55,10 @@ class Topic:
     qos: Qos = EVENT
     listeners: tuple[str, ...] = ()
 
+    def of(self, robot: str = "") -> str:
+        """Name a robot's topic in full, or one of the formation itself (''), where the formation lies in the root."""
+        return absolute(f"/{robot}", self.name)
+
 
 def follower(number: int) -> str:
     """Name the n-th follower, counted from 1."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.forecasts import OneStepForecasts
 from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
+from robot_formation.analysis.quantiles import NORMAL_90
 
 # Okabe and Ito's palette, safe for colour-blind readers.
 _COLOURS = ("#0072B2", "#E69F00", "#009E73")
@@ -20,7 +21,6 @@ MOST_DRAWN = len(_COLOURS)
 
 _AXES = ("u (to the right)", "v (forward)")
 _CM = 100.0
-_NORMAL_90 = 1.645  # 90 % of a normal distribution lie within so many standard deviations
 _MANY = 60  # timesteps from which on single marks would run into each other
 
 
@@ -69,7 +69,7 @@ def _panel(axes: Any, target_m: NDArray[np.float64], forecast: OneStepForecasts,
 
 
 def _band_cm(forecast: OneStepForecasts, row: int) -> NDArray[np.float64]:
-    half = _NORMAL_90 * np.sqrt(forecast.covariances_m2[:, row, row])
+    half = NORMAL_90 * np.sqrt(forecast.covariances_m2[:, row, row])
     return np.stack([forecast.means_m[:, row] - half, forecast.means_m[:, row] + half]) * _CM
 
 

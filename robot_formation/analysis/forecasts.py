@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
+from robot_formation.analysis.quantiles import ELLIPSE_90
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
-
-CHI_SQUARE_90 = 4.605
-"""90 % quantile of the chi-square distribution with two degrees of freedom: the size of a 90 % ellipse."""
 
 _TABLE = (
     ("n", "rmse_u", "rmse_v", "rmse", "median", "worst", "coverage_90"),
@@ -102,7 +100,7 @@ def inside_ellipse(errors_m: NDArray[np.float64], covariances_m2: NDArray[np.flo
     e^T C^-1 e <= q is the same as q C - e e^T having no negative eigenvalue (Schur complement), which needs no inverse
     and so holds for a covariance of zero too.
     """
-    rest = CHI_SQUARE_90 * covariances_m2 - errors_m[:, :, None] * errors_m[:, None, :]
+    rest = ELLIPSE_90 * covariances_m2 - errors_m[:, :, None] * errors_m[:, None, :]
     u, v, mixed = rest[:, 0, 0], rest[:, 1, 1], rest[:, 0, 1]
     return np.asarray((u >= 0.0) & (v >= 0.0) & (u * v >= mixed**2))
 

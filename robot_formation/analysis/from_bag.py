@@ -77,16 +77,16 @@ def record_of(
     """
     messages = defaultdict(list, messages)
     stamps = defaultdict(list, stamps or {})
-    markers = messages[names.absolute("", names.SURFACE.name)]
-    tracks = {robot: _track(messages[names.absolute("", names.ground_truth_odom(robot).name)]) for robot in robots}
+    markers = messages[names.SURFACE.of()]
+    tracks = {robot: _track(messages[names.ground_truth_odom(robot).of()]) for robot in robots}
     record = RunRecord(
-        leader_moved=_stamped(messages[f"/{names.LEADER}/{names.MOVED.name}"]),
+        leader_moved=_stamped(messages[names.MOVED.of(names.LEADER)]),
         followers=tuple(_follower(robot, messages, stamps) for robot in robots if robot != names.LEADER),
         tracks={robot: track for robot, track in tracks.items() if track is not None},
         simulated_s=_last_stamp_ns(messages) / 1e9,
         details=details,
         ground=_ground(markers[-1]) if markers else None,
-        left_plate=tuple(message.data for message in messages[names.absolute("", names.left_plate().name)]),
+        left_plate=tuple(message.data for message in messages[names.left_plate().of()]),
     )
     return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
 
@@ -106,13 +106,13 @@ def load_displacements(path: str | Path, robot: str, namespace: str | None = Non
     """
     with read_bag(path) as opened:
         bag = FormationBag(opened, namespace)
-        topics = {f"/{robot}/{topic.name}": topic.type for topic in _LOGGED}
+        topics = {topic.of(robot): topic.type for topic in _LOGGED}
         _require_displacements(bag, robot)
         bag.require({topic: type_name for topic, type_name in topics.items() if topic in bag.topics})
         messages: dict[str, list[Any]] = defaultdict(list)
         for message in bag.messages(topics):
             messages[message.topic].append(message.message)
-    if not messages[f"/{robot}/{names.DISPLACEMENT.name}"]:
+    if not messages[names.DISPLACEMENT.of(robot)]:
         raise AnalysisError(f"{path} has no displacements of '{robot}'; give the bag of a run with finished timesteps")
     by_stamp = [{entry.stamp_ns: entry.motion for entry in _stamped(messages[topic])} for topic in topics]
     stamps = sorted(by_stamp[0])
@@ -156,20 +156,17 @@ def _robots(bag: FormationBag) -> list[str]:
 
 def run_topics(robots: Sequence[str]) -> dict[str, str]:
     """Name the topics that the analysis reads, with their message types."""
-    topics = {
-        names.absolute("", topic.name): topic.type
-        for topic in (names.SURFACE, names.left_plate(), names.OVERHEAD_POSES)
-    }
+    topics = {topic.of(): topic.type for topic in (names.SURFACE, names.left_plate(), names.OVERHEAD_POSES)}
     for robot in robots:
         odom = names.ground_truth_odom(robot)
-        topics[names.absolute("", odom.name)] = odom.type
-        topics.update({f"/{robot}/{topic.name}": topic.type for topic in (*_MOTIONS, names.MOVE, names.ALIGNMENT)})
+        topics[odom.of()] = odom.type
+        topics.update({topic.of(robot): topic.type for topic in (*_MOTIONS, names.MOVE, names.ALIGNMENT)})
     return topics
 
 
 def _follower(robot: str, messages: Mapping[str, Sequence[Any]], stamps: Mapping[str, Sequence[int]]) -> FollowerRecord:
-    moved, displacements, residuals, predictions = (_stamped(messages[f"/{robot}/{topic.name}"]) for topic in _MOTIONS)
-    states = f"/{robot}/{names.ALIGNMENT.name}"
+    moved, displacements, residuals, predictions = (_stamped(messages[topic.of(robot)]) for topic in _MOTIONS)
+    states = names.ALIGNMENT.of(robot)
     return FollowerRecord(
         robot,
         moved,
@@ -178,7 +175,7 @@ def _follower(robot: str, messages: Mapping[str, Sequence[Any]], stamps: Mapping
         predictions,
         states=tuple(message.data for message in messages[states]),
         state_stamps_ns=tuple(stamps[states]),
-        commands=tuple(_motion(message.pose) for message in messages[f"/{robot}/{names.MOVE.name}"]),
+        commands=tuple(_motion(message.pose) for message in messages[names.MOVE.of(robot)]),
     )
 
 
@@ -233,11 +230,11 @@ def _overhead(
     where it was told that the robot starts: it counts only if the second picture has changed it. A robot that is never
     seen has no track.
     """
-    told = sorted(messages[names.absolute("", names.OVERHEAD_POSES.name)], key=_stamp_ns)
+    told = sorted(messages[names.OVERHEAD_POSES.of()], key=_stamp_ns)
     told = [message for message in told if len(message.poses) == len(robots)]
     tracks = {}
     for number, robot in enumerate(robots):
-        truth = messages[names.absolute("", names.ground_truth_odom(robot).name)]
+        truth = messages[names.ground_truth_odom(robot).of()]
         if not told or not truth:
             continue
         places = np.array([_place(message.poses[number].position) for message in told])

@@ -34,13 +34,11 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.moves import Moves, move_totals, movements_of, moves_of
+from robot_formation.analysis.quantiles import ELLIPSE_90
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord
 from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.names import beacon_neighbour
-
-ELLIPSE_90 = -2.0 * math.log(0.1)
-"""Squared Mahalanobis distance of a 90 % ellipse: the quantile of chi-square with two degrees of freedom."""
 
 
 @dataclass(frozen=True)

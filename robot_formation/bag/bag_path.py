@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
 import socket
@@ -11,6 +10,7 @@ from pathlib import Path
 from types import TracebackType
 
 from robot_formation.bag.errors import BagError
+from robot_formation.system.reservation import reserve
 
 PARTIAL_SUFFIX = ".partial"
 """What a bag's folder is called while it is being written, behind its name."""
@@ -56,17 +56,12 @@ class PathReservation:
         """
         if self._socket is not None:
             return True
-        taken = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         name = hashlib.sha256(str(self.path).encode()).hexdigest()
         try:
-            taken.bind(f"\0robot_formation_bag_{name}")
+            self._socket = reserve(f"bag_{name}")
         except OSError as error:
-            taken.close()
-            if error.errno != errno.EADDRINUSE:
-                raise BagError(f"{self.path} can't be reserved: {error.strerror or error}") from error
-            return False
-        self._socket = taken
-        return True
+            raise BagError(f"{self.path} can't be reserved: {error.strerror or error}") from error
+        return self._socket is not None
 
     def release(self) -> None:
         """Let others have the path."""

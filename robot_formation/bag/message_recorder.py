@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
+from robot_formation import names
 from robot_formation.bag.definitions import Definition, jazzy_typestore
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.transforms import Transforms
@@ -105,6 +106,16 @@ class Recorder:
             self._add_transforms()
             self._writer.end_chunk()
 
+    def record_as(self, name: str, topic: names.Topic, cdr: bytes) -> None:
+        """Record a message of one of the project's topics under its full name; the first one declares it.
+
+        Raises:
+            BagError: as for `add_topic` and `record`.
+        """
+        if name not in self._topics:
+            self.add_topic(name, topic.type, TopicQos.of(topic.qos))
+        self.record(name, topic.type, cdr)
+
     def close(self) -> Path:
         """Finish the bag; return its path.
 
@@ -122,8 +133,7 @@ class Recorder:
             if topic.name not in self._own:
                 if topic.name in self._topics:
                     continue  # somebody publishes it
-                q = topic.qos
-                self.add_topic(topic.name, topic.type, TopicQos(q.history, q.depth, q.reliability, q.durability))
+                self.add_topic(topic.name, topic.type, TopicQos.of(topic.qos))
                 self._own[topic.name] = topic.type
             self._writer.write(topic.name, cdr, stamp_ns)
 

@@ -10,6 +10,7 @@ import yaml
 
 from robot_formation.bag.errors import BagError
 from robot_formation.errors import shown
+from robot_formation.names import Qos
 from robot_formation.system.yaml_files import YamlError, parse_yaml
 
 INFINITE_NS = 2**63 - 1
@@ -55,6 +56,11 @@ class TopicQos:
                 raise BagError(f"QoS {policy} can't be {shown(getattr(self, policy))}; there are: {', '.join(choices)}")
         if self.depth < 0:
             raise BagError(f"QoS depth can't be {self.depth}; it must be 0 or more")
+
+    @classmethod
+    def of(cls, qos: Qos) -> TopicQos:
+        """Return what a publisher of one of the project's topics offers."""
+        return cls(qos.history, qos.depth, qos.reliability, qos.durability)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return rosbag2's mapping of one offered profile, keys in rosbag2's order."""

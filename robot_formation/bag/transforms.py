@@ -16,13 +16,12 @@ from typing import Any, NamedTuple
 
 from robot_formation import names
 from robot_formation.bag.definitions import jazzy_typestore
-from robot_formation.geometry.orientation import quaternion
+from robot_formation.geometry.orientation import Vector, quaternion
 
 _POSES = re.compile(r"(.*)/ground_truth/([^/]+)/odom")
 _DESCRIPTIONS = re.compile(r"(.*)/([^/]+)/robot_description")
 _ODOMETRY, _STRING = "nav_msgs/msg/Odometry", "std_msgs/msg/String"
 
-Vector = tuple[float, float, float]
 _MOST_CHARACTERS = 10_000_000
 
 

@@ -104,11 +104,6 @@ class BagWriter:
                 raise
 
     @property
-    def file_name(self) -> str:
-        """Name of the file that is being written."""
-        return self._file.path.name
-
-    @property
     def open_bytes(self) -> int:
         """Bytes in the chunk that is not closed yet: what a killed writer would lose."""
         return self._file.open_bytes

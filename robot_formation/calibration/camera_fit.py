@@ -15,9 +15,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from robot_formation.alignment.paper_rules import TARGET, Box, bounding_boxes
 from robot_formation.calibration.camera_samples import CameraSample
@@ -39,8 +41,7 @@ _SAME_M = 1e-9
 _WIDTH_PX = 316.0
 _MARGIN_PX = 5.0
 """A face nearer to the picture's border than this may be cut off by it."""
-_ITERATIONS = 50
-_CONVERGED = 1e-10
+_CONVERGED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -153,15 +154,19 @@ def fit_camera(views: Iterable[FaceView], edge_m: float) -> CameraFit:
         )
     columns = np.array([view.box.x for view in used])
     sides = np.array([view.box.side for view in used])
-    found = _start(u, v, columns, sides, edge_m)
-    for _ in range(_ITERATIONS):
-        residuals, jacobian = _system(found, u, v, columns, sides, edge_m)
-        step = np.linalg.lstsq(jacobian, residuals, rcond=None)[0]
-        found = found - step
-        if not np.all(np.isfinite(found)) or found[2] <= 0.0 or np.max(np.abs(step)) < _CONVERGED:
-            break
-    residuals, jacobian = _system(found, u, v, columns, sides, edge_m)
-    if not np.all(np.isfinite(residuals)) or found[2] <= 0.0 or np.linalg.matrix_rank(jacobian) < len(NAMES):
+    solved = least_squares(
+        partial(_residuals, u=u, v=v, columns=columns, sides=sides, edge_m=edge_m),
+        _start(u, v, columns, sides, edge_m),
+        partial(_jacobian, u=u, v=v, edge_m=edge_m),
+        method="lm",
+        x_scale="jac",
+        ftol=_CONVERGED,
+        xtol=_CONVERGED,
+        gtol=_CONVERGED,
+    )
+    found, residuals = solved.x, solved.fun
+    jacobian = _jacobian(found, u, v, edge_m)
+    if found[2] <= 0.0 or np.linalg.matrix_rank(jacobian) < len(NAMES):
         raise CalibrationError("the views of the Target face lie on no pan and side-length curves; look at the table")
     freedom = max(2 * len(used) - len(NAMES), 1)
     variance = float(residuals @ residuals) / freedom
@@ -234,19 +239,21 @@ def _start(u: Floats, v: Floats, columns: Floats, sides: Floats, edge_m: float) 
     return np.array([target_x, slope, distance, product / slope if slope else 0.0, bias])
 
 
-def _system(
-    vector: Floats, u: Floats, v: Floats, columns: Floats, sides: Floats, edge_m: float
-) -> tuple[Floats, Floats]:
-    """Residuals (2n,) and their derivatives (2n, 5)."""
+def _residuals(vector: Floats, u: Floats, v: Floats, columns: Floats, sides: Floats, edge_m: float) -> Floats:
+    """Curves minus columns and side lengths (2n,)."""
+    column, side = _model(vector, u, v, edge_m)
+    return np.concatenate([column - columns, side - sides])
+
+
+def _jacobian(vector: Floats, u: Floats, v: Floats, edge_m: float) -> Floats:
+    """Derivatives (2n, 5) of the residuals."""
     _, slope, distance, lead, _ = vector
     depth = u - FORMATION_DISTANCE_M + distance
     q, dq = distance / depth, (u - FORMATION_DISTANCE_M) / depth**2
     one, zero = np.ones_like(u), np.zeros_like(u)
     upper = [one, lead - q * (v + lead), -slope * (v + lead) * dq, slope * (1.0 - q), zero]
     lower = [zero, edge_m * q, edge_m * slope * dq, zero, -one]
-    column, side = _model(vector, u, v, edge_m)
-    jacobian = np.concatenate([np.stack(upper, axis=1), np.stack(lower, axis=1)])
-    return np.concatenate([column - columns, side - sides]), jacobian
+    return np.concatenate([np.stack(upper, axis=1), np.stack(lower, axis=1)])
 
 
 def _rms(values: Floats) -> float:

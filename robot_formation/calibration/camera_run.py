@@ -12,7 +12,6 @@ from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.bag.message_recorder import Recorder
-from robot_formation.bag.qos import TopicQos
 from robot_formation.batch.pool import run_parallel
 from robot_formation.calibration.alignment_trial import FOLLOWER
 from robot_formation.calibration.camera_grid import Conditions, Position, measure, stand
@@ -109,9 +108,5 @@ def _odometry(pose: Pose, robot: str, stamp_ns: int) -> Any:
     )
 
 
-def _record(recorder: Recorder, namespace: str, topic: names.Topic, message: Any) -> None:
-    name = names.absolute(f"/{namespace}", topic.name)
-    if name not in recorder.topics:
-        q = topic.qos
-        recorder.add_topic(name, topic.type, TopicQos(q.history, q.depth, q.reliability, q.durability))
-    recorder.record(name, topic.type, conversions.to_cdr(message))
+def _record(recorder: Recorder, robot: str, topic: names.Topic, message: Any) -> None:
+    recorder.record_as(topic.of(robot), topic, conversions.to_cdr(message))

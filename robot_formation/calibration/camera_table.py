@@ -2,27 +2,50 @@
 
 from __future__ import annotations
 
-import csv
-import json
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, fields
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from robot_formation.batch.resumable_table import ResumableTable, read_record, write_record
 from robot_formation.calibration.camera_grid import Position
 from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.drive.curves import CalibrationError
-from robot_formation.system.files import MOST_RECORD_BYTES, read_file, whole_lines
 from robot_formation.vision.pixy2.block import Block
 
 TABLE_NAME = "vision.csv"
 RECORD_NAME = "vision.json"
-_POSE = ("u_m", "v_m", "clockwise_deg", "attainable", "frames")
-_BLOCK = tuple(field.name for field in fields(Block))
-COLUMNS = (*_POSE, *_BLOCK)
-"""One row per reported block; the block's columns are empty where nothing was reported."""
-
 Key = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """One reported block of a sample, or a sample in which nothing was reported; see `CameraSample` and `Block`."""
+
+    u_m: float
+    v_m: float
+    clockwise_deg: float
+    attainable: int
+    frames: int
+    signature: int | None = None
+    x: int | None = None
+    y: int | None = None
+    width: int | None = None
+    height: int | None = None
+    angle: int | None = None
+    index: int | None = None
+    age: int | None = None
+
+    def __post_init__(self) -> None:
+        """Check that the block is whole, or none."""
+        if len({value is None for value in astuple(self)[_POSE_COLUMNS:]}) != 1:
+            raise ValueError("half a block")
+
+
+COLUMNS = tuple(field.name for field in fields(TableRow))
+"""The block's columns are empty where nothing was reported."""
+_POSE_COLUMNS = 5
 
 
 class VisionTable:
@@ -46,7 +69,8 @@ class VisionTable:
             _require_same(recorded, record)
         elif self.path.exists():
             raise CalibrationError(f"{self.path} is there without its record {RECORD_NAME}; start anew with --force")
-        recorded.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
+        write_record(recorded, record)
+        self._table = _table(self.path)
         if self.path.exists():
             wanted = {(p.u_m, p.v_m): len(p.angles_deg) for p in positions}
             groups: dict[Key, list[CameraSample]] = {}
@@ -54,19 +78,12 @@ class VisionTable:
                 groups.setdefault((sample.u_m, sample.v_m), []).append(sample)
             # A position that was cut off by the end of the last run is looked at again.
             self.samples = {key: found for key, found in groups.items() if len(found) == wanted.get(key)}
-        unfinished = self.path.with_suffix(".partial")
-        with unfinished.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            for found in self.samples.values():
-                writer.writerows(_rows(found))
-        unfinished.replace(self.path)
+        self._table.rewrite(row for found in self.samples.values() for row in _rows(found))
 
     def add(self, found: Sequence[CameraSample]) -> None:
         """Append all samples of a position; they are in the file when this returns."""
         self.samples[found[0].u_m, found[0].v_m] = list(found)
-        with self.path.open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows(_rows(found))
+        self._table.append(_rows(found))
 
     def remaining(self, positions: Iterable[Position]) -> list[Position]:
         """List the positions that are not in the table yet."""
@@ -83,46 +100,35 @@ def read_table(path: Path) -> Iterator[CameraSample]:
     Raises:
         CalibrationError: if the file is no such table.
     """
-    try:
-        reader = csv.reader(list(whole_lines(path)))
-    except (OSError, ValueError) as error:
-        raise CalibrationError(f"{path}: can't read it: {error}") from None
-    if tuple(next(reader, ())) != COLUMNS:
-        raise CalibrationError(f"{path}: no table of a camera's calibration; start anew with --force")
-    pose: tuple[float, float, float, bool, int] | None = None
-    blocks: list[Block] = []
-    for cells in reader:
-        try:
-            found = (float(cells[0]), float(cells[1]), float(cells[2]), bool(int(cells[3])), int(cells[4]))
-            block = Block(*map(int, cells[5:])) if cells[5] else None
-        except (ValueError, IndexError, TypeError):
-            raise CalibrationError(
-                f"{path}: line {reader.line_num} can't be read; start anew with --force, or delete it"
-            ) from None
-        if pose is not None and found != pose:
-            yield CameraSample(*pose, tuple(blocks))
-            blocks = []
-        pose = found
-        blocks += [block] if block is not None else []
-    if pose is not None:
-        yield CameraSample(*pose, tuple(blocks))
+    for pose, rows in itertools.groupby(_table(path).read(), key=lambda row: astuple(row)[:_POSE_COLUMNS]):
+        u_m, v_m, clockwise_deg, attainable, frames = pose
+        blocks = tuple(Block(*astuple(row)[_POSE_COLUMNS:]) for row in rows if row.signature is not None)
+        yield CameraSample(u_m, v_m, clockwise_deg, bool(attainable), frames, blocks)
 
 
-def _rows(samples: Iterable[CameraSample]) -> Iterator[list[Any]]:
+def _table(path: Path) -> ResumableTable[TableRow]:
+    return ResumableTable(
+        path,
+        TableRow,
+        CalibrationError,
+        "no table of a camera's calibration; start anew with --force",
+        "start anew with --force, or delete it",
+    )
+
+
+def _rows(samples: Iterable[CameraSample]) -> Iterator[TableRow]:
     for s in samples:
-        pose = [s.u_m, s.v_m, s.clockwise_deg, int(s.attainable), s.frames]
-        for block in s.blocks:
-            yield [*pose, *astuple(block)]
-        if not s.blocks:
-            yield [*pose, *("" for _ in _BLOCK)]
+        for block in s.blocks or (None,):
+            cells = () if block is None else astuple(block)
+            yield TableRow(s.u_m, s.v_m, s.clockwise_deg, int(s.attainable), s.frames, *cells)
 
 
 def _require_same(recorded: Path, record: Mapping[str, Any]) -> None:
     try:
-        earlier = json.loads(read_file(recorded, MOST_RECORD_BYTES))
-        different = [name for name in {**earlier, **record} if earlier.get(name) != record.get(name)]
-    except (OSError, ValueError, TypeError, AttributeError, RecursionError):
+        earlier = read_record(recorded)
+    except ValueError:
         raise CalibrationError(f"{recorded}: no record of a calibration; start anew with --force") from None
+    different = [name for name in {**earlier, **record} if earlier.get(name) != record.get(name)]
     if different:
         name = different[0]
         raise CalibrationError(

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from scipy import stats
 
 from robot_formation.drive.curves import CalibrationError, Curve
 
 Floats = NDArray[np.float64]
 
 DEGREES = (1, 2, 3)
-_REFUSED = 2.326
-"""Standard normal deviate that chance exceeds in 1 % of the cases."""
+_SIGNIFICANCE = 0.01
+"""Share of true curves that the test for lack of fit refuses."""
 _NEGLIGIBLE = 1e-6
 """A difference in travel (m or rad) that no observer can tell; keeps rounding errors from choosing the degree."""
 
@@ -100,7 +101,8 @@ def fit_axis(axis: str, drives: Iterable[MeasuredDrive], degrees: Sequence[int] 
     _check(axis, rotations, travels, max(degrees) + 2)
     fits = {degree: _fit(axis, degree, rotations, travels, groups) for degree in sorted(degrees)}
     tests = {degree: _lack_of_fit(fit) for degree, fit in fits.items()}
-    degree = next((degree for degree, deviate in tests.items() if deviate <= _REFUSED), max(fits))
+    refused = stats.norm.isf(_SIGNIFICANCE)
+    degree = next((degree for degree, deviate in tests.items() if deviate <= refused), max(fits))
     return replace(fits[degree], lack_of_fit=tests)
 
 
@@ -132,16 +134,13 @@ def _fit(axis: str, degree: int, rotations: Floats, travels: Floats, groups: Map
 
 
 def _lack_of_fit(fit: AxisFit) -> float:
-    """F of residuals against the scatter of repeated drives, as a standard normal deviate (Paulson, 1942).
-
-    E. Paulson, An approximate normalization of the analysis of variance distribution, Annals of Mathematical
-    Statistics 13 (1942), 233-235.
-    """
+    """F of residuals against the scatter of repeated drives, as the standard normal deviate of equal probability."""
     between = len(fit.points) - len(fit.curve)
     within = sum(point.drives - 1 for point in fit.points)
     if within == 0:
         return 0.0  # nothing was repeated: residuals can't be judged
     variance = fit.scatter**2 + _NEGLIGIBLE**2
-    f = sum(point.drives * point.residual**2 for point in fit.points) / between / variance
-    a, b = 2.0 / (9.0 * between), 2.0 / (9.0 * within)
-    return float(((1.0 - b) * f ** (1.0 / 3.0) - (1.0 - a)) / np.sqrt(b * f ** (2.0 / 3.0) + a))
+    ratio = sum(point.drives * point.residual**2 for point in fit.points) / between / variance
+    chance = stats.f.sf(ratio, between, within)
+    # Probabilities that round to 0 or 1 have no finite deviate; the report is JSON, which has no infinity.
+    return float(stats.norm.isf(np.clip(chance, np.finfo(float).tiny, 1.0 - np.finfo(float).eps)))

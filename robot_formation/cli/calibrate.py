@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,13 +11,16 @@ from robot_formation.cli.calibrate_vision import DESCRIPTION as VISION_DESCRIPTI
 from robot_formation.cli.calibrate_vision import add_options as add_vision_options
 from robot_formation.cli.calibrate_vision import run_vision
 from robot_formation.cli.calibration_options import build_scenario, free_folder
-from robot_formation.cli.parser import whole_number
+from robot_formation.cli.messages import say
+from robot_formation.cli.option_types import option_type, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
     from robot_formation.calibration.rig import CalibrationRig
     from robot_formation.experiment.scenario import Scenario
 
+_COUNT = option_type(int, lambda value: 1 <= value <= 1000, "a whole number from 1 to 1000")
+_LENGTH = option_type(float, lambda value: 0.0 <= value <= 0.1, "a length from 0 to 0.1 m")
 DESCRIPTION = "Measure the robots of a scenario, each alone in the middle of the plate, or the follower's camera."
 MOTORS_DESCRIPTION = """\
 Drive each robot of the scenario over preset wheel rotations (followers along v and u, the leader along v, and turns),
@@ -79,14 +79,14 @@ def _add_drives(parser: argparse.ArgumentParser, *, repeats: int) -> None:
     parser.add_argument(
         "--repeats",
         metavar="N",
-        type=_whole,
+        type=_COUNT,
         default=repeats,
         help=f"times each drive is made forth and back (default: {repeats})",
     )
     parser.add_argument(
         "--reference-noise",
         metavar="M",
-        type=_length,
+        type=_LENGTH,
         default=0.0,
         help="standard deviation of the observer's x and y, in metres (default: 0)",
     )
@@ -107,7 +107,7 @@ def run_motors(args: argparse.Namespace) -> int:
     scenario = build_scenario(args, with_curves=False)
     folder = free_folder(args, scenario, (CALIBRATION_FILE, MOTORS_PICTURE))
     rig = make_rig(args, scenario)
-    fits = calibrate_motors(rig, scenario.robots, scenario.drive, args.repeats, _say)
+    fits = calibrate_motors(rig, scenario.robots, scenario.drive, args.repeats, say)
     conditions = {**_conditions(args, scenario), **robot_facts(scenario.drive, scenario.world)}
     save_calibration(folder / CALIBRATION_FILE, MotorCalibration(curves(fits).robots, conditions))
     picture = draw_motors(fits, f"Motor calibration · {_told(args, scenario)}", folder / MOTORS_PICTURE)
@@ -139,9 +139,9 @@ def run_encoders(args: argparse.Namespace) -> int:
     if args.robot not in scenario.robots:
         raise FormationError(f"the scenario has no robot '{args.robot}'{suggestion(args.robot, scenario.robots)}")
     folder = free_folder(args, scenario, (ENCODERS_PICTURE,))
-    _say(describe_curves(scenario.drive))
+    say(describe_curves(scenario.drive))
     rig = make_rig(args, scenario)
-    comparisons = compare_distances(measure_encoders(rig, args.robot, scenario.drive, args.repeats, _say))
+    comparisons = compare_distances(measure_encoders(rig, args.robot, scenario.drive, args.repeats, say))
     title = f"{args.robot.replace('_', ' ')}, travelled distances · {_told(args, scenario)}"
     picture = draw_encoders(comparisons, title, folder / ENCODERS_PICTURE)
     if args.json:
@@ -174,26 +174,3 @@ def _told(args: argparse.Namespace, scenario: Scenario) -> str:
     said = [f"seed {scenario.setup.seed}", scenario.world.surface, f"{args.repeats} times each way"]
     said += [f"reference noise {args.reference_noise * 1e3:g} mm"] if args.reference_noise else []
     return ", ".join(said)
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
-def _whole(text: str) -> int:
-    return int(_within(text, 1, 1000, "a whole number from 1 to 1000", int))
-
-
-def _length(text: str) -> float:
-    return _within(text, 0.0, 0.1, "a length from 0 to 0.1 m", float)
-
-
-def _within(text: str, low: float, high: float, what: str, kind: Callable[[str], float]) -> float:
-    """Convert for argparse, which turns the error into one line."""
-    try:
-        value = kind(text)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:  # nor is NaN
-        raise argparse.ArgumentTypeError(f"{text!r} is not {what}")
-    return value

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.batch.progress_line import with_progress
 from robot_formation.cli.calibration_options import build_scenario, output_folder
-from robot_formation.cli.parser import number, whole_number
-from robot_formation.cli.sweep import with_progress
+from robot_formation.cli.option_types import number, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:

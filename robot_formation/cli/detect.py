@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robot_formation.cli.messages import say
+from robot_formation.cli.option_types import positive_whole
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--dt-us",
         metavar="N",
-        type=_positive,
+        type=positive_whole,
         default=_FRAME_US,
         help=f"with --sequence: microseconds between frames (default: {_FRAME_US})",
     )
@@ -72,11 +73,11 @@ def run(args: argparse.Namespace) -> int:
         check_readable(path)
     if args.mask is not None:
         _check_mask(args)
-    parameters = read_parameters(args.parameters, _warn) if args.parameters else DetectorParameters()
+    parameters = read_parameters(args.parameters, say) if args.parameters else DetectorParameters()
     if not args.sequence:
         parameters = dataclasses.replace(parameters, block_filtering=0)
     detector = _detector(args.sensor, args.signatures, parameters)
-    pictures = ((path, read_picture(path, _warn)) for path in args.images)
+    pictures = ((path, read_picture(path, say)) for path in args.images)
     frames = _sequence(detector, pictures, args.dt_us) if args.sequence else _singles(detector, pictures)
     results = []
     for path, picture, blocks in frames:
@@ -155,18 +156,3 @@ def _table(results: list[dict[str, Any]]) -> str:
         lines.append(f"{result['image']}: {count or 'no'} block{'' if count == 1 else 's'}")
         lines += ["  " + "  ".join(f"{name} {value}" for name, value in block.items()) for block in result["blocks"]]
     return "\n".join(lines)
-
-
-def _positive(text: str) -> int:
-    """An argparse type for a whole number above zero."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number above zero")
-    return value
-
-
-def _warn(text: str) -> None:
-    print(text, file=sys.stderr)

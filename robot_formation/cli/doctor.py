@@ -10,13 +10,15 @@ import contextlib
 import importlib
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import robot_formation
 from robot_formation import paths
 from robot_formation.network.shared_memory_space import SHARED_MEMORY, SharedMemoryError, require_space
+from robot_formation.system.git_commit import git_commit
+from robot_formation.system.standard_error import silent_stderr
 
 # Module to import, and the distributions (of pip) that may bring it.
 _MODULES = {
@@ -78,13 +80,12 @@ def collect(missing: list[str]) -> Report:
     }
     report: Report = {}
     for name, section in sections.items():
-        with _without_stderr():  # pybullet greets on standard error
+        with silent_stderr():  # pybullet greets on standard error
             report[name] = section(missing)
     return report
 
 
 def _project(missing: list[str]) -> dict[str, Any]:
-    root = paths.project_root()
     try:
         config: str | None = str(paths.config_dir())
     except ValueError as error:
@@ -92,7 +93,7 @@ def _project(missing: list[str]) -> dict[str, Any]:
         missing.append(str(error))
     return {
         "version": robot_formation.__version__,
-        "commit": None if root is None else _commit(root),
+        "commit": git_commit(12) or None,
         "code": str(Path(robot_formation.__file__).parent),
         "config": config,
         "bags": str(paths.default_bags_dir()),
@@ -201,30 +202,5 @@ def _version(module: Any, distributions: tuple[str, ...]) -> str:
     return str(getattr(module, "__version__", "present"))
 
 
-def _commit(root: Path) -> str | None:
-    """Name the checkout's commit, with -dirty if files were changed; None without git."""
-    import subprocess
-
-    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        return None
-
-
 def _one_line(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
-
-
-@contextlib.contextmanager
-def _without_stderr() -> Iterator[None]:
-    """Silence what libraries write to standard error below Python."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    with open(os.devnull, "w") as nowhere:
-        os.dup2(nowhere.fileno(), 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)

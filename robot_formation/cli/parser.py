@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, NoReturn
 
 from robot_formation import exit_codes
 from robot_formation.cli.interrupts import forget_output
+from robot_formation.cli.option_types import quoted
 from robot_formation.parameters import suggestion
 
 
@@ -66,7 +66,7 @@ class Parser(argparse.ArgumentParser):
             return
         for option in options:
             if not self._knows(option):
-                self.error(f"no option {_short(option)}{self.unknown_hint or self._suggestion(option)}")
+                self.error(f"no option {quoted(option)}{self.unknown_hint or self._suggestion(option)}")
 
     def _knows(self, option: str) -> bool:
         known = self._option_string_actions
@@ -82,8 +82,8 @@ class Parser(argparse.ArgumentParser):
         """Explain an argument that is one too many."""
         option = f"--{word.partition('=')[0]}"
         if option in self._option_string_actions:
-            return f"{_short(word)} is one argument too many{suggestion(option, [option])}"
-        return f"{_short(word)} is one argument too many{self.unknown_hint}; '{self.prog} --help' tells what it takes"
+            return f"{quoted(word)} is one argument too many{suggestion(option, [option])}"
+        return f"{quoted(word)} is one argument too many{self.unknown_hint}; '{self.prog} --help' tells what it takes"
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is None or value in action.choices:
@@ -96,9 +96,9 @@ class Parser(argparse.ArgumentParser):
         else:
             hint = f"; there are: {', '.join(choices)}"
         if action.option_strings:
-            raise argparse.ArgumentError(action, f"can't be {_short(str(value))}{hint}")
+            raise argparse.ArgumentError(action, f"can't be {quoted(str(value))}{hint}")
         what = "verb " if action.metavar == "VERB" else ""
-        raise argparse.ArgumentError(None, f"no {what}{_short(str(value))}{hint}")
+        raise argparse.ArgumentError(None, f"no {what}{quoted(str(value))}{hint}")
 
 
 def _options(words: Sequence[str], *, until_verb: bool) -> Iterator[str]:
@@ -124,48 +124,3 @@ def _path(text: str) -> Path:
     if not text.strip():
         raise argparse.ArgumentTypeError(f"{text!r} is no path")
     return Path(text)
-
-
-def whole_number(text: str) -> int:
-    """An argparse type: an integer."""
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{_short(text)} is not a whole number") from None
-
-
-def number(text: str) -> float:
-    """An argparse type: a finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{_short(text)} is not a number")
-    return value
-
-
-def _short(text: str) -> str:
-    return repr(text if len(text) <= 60 else f"{text[:57]}...")
-
-
-class Names(argparse.Action):
-    """Names separated by commas; an option that is repeated adds to them, and each name counts once.
-
-    The value is a tuple of texts in the order given; the default is one too.
-    """
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[Any] | None,
-        option_string: str | None = None,
-    ) -> None:
-        """Add what was given."""
-        names = [name.strip() for name in str(values).split(",")]
-        if not all(names):
-            raise argparse.ArgumentError(self, f"takes one or several, separated by commas, not {_short(str(values))}")
-        before = getattr(namespace, self.dest)
-        earlier = () if before is self.default else before  # the default goes when names are given
-        setattr(namespace, self.dest, tuple(dict.fromkeys([*earlier, *names])))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
-from robot_formation.cli.parser import number
+from robot_formation.cli.messages import say, warn
+from robot_formation.cli.option_types import number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -69,19 +69,20 @@ def run(args: argparse.Namespace) -> int:
     selection = Selection(args.topics, args.regex, args.exclude)
     with read_bag(args.bag) as bag:
         if bag.recovered:
-            _say(f"{args.bag} was not closed: what can be saved of it is played")
+            say(f"{args.bag} was not closed: what can be saved of it is played")
         selection.check(bag.topics, args.bag)
-        from robot_formation.nodes.host.session import Interrupts, node_session
+        from robot_formation.nodes.host.session import node_session
         from robot_formation.nodes.player.player_node import PlayerNode
+        from robot_formation.system.signal_handling import SignalCounter
 
         parameters = _parameters(args)
-        with Interrupts() as interrupts, node_session("player") as node:
-            player = PlayerNode(node, bag, parameters, warn=lambda text: _say(f"warning: {text}"))
-            _say(f"playing {args.bag}: {bag.message_count} messages, {bag.duration_s:.3f} s")
-            report = player.run(interrupts)
+        with SignalCounter(1) as signals, node_session("player") as node:
+            player = PlayerNode(node, bag, parameters, warn=warn)
+            say(f"playing {args.bag}: {bag.message_count} messages, {bag.duration_s:.3f} s")
+            report = player.run(signals.came)
     _tell(args, report)
     if report.interrupted:
-        _say("formation play: interrupted")
+        say("formation play: interrupted")
         return exit_codes.INTERRUPTED
     return exit_codes.DONE
 
@@ -110,7 +111,7 @@ def _parameters(args: argparse.Namespace) -> PlayerParameters:
 
 def _tell(args: argparse.Namespace, report: PlayReport) -> None:
     if args.wait and report.unheard:
-        _say(f"warning: after {args.wait:g} s nobody had subscribed to {', '.join(report.unheard)}")
+        say(f"warning: after {args.wait:g} s nobody had subscribed to {', '.join(report.unheard)}")
     if args.json:
         print(json.dumps(_to_json(args, report), indent=2))
         return
@@ -136,7 +137,3 @@ def _to_json(args: argparse.Namespace, report: PlayReport) -> dict[str, Any]:
         "unheard": list(report.unheard),
         "interrupted": report.interrupted,
     }
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import names
-from robot_formation.cli.parser import Names
+from robot_formation.cli.option_types import Names
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robot_formation.cli.messages import say, warn
+from robot_formation.cli.option_types import positive
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -35,15 +36,15 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--no-images", action="store_true", help="leave pictures out, unless their topic is named")
     parser.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder of the bag (default: a new one in bags/)")
     parser.add_argument("--compression", choices=("zstd", "none"), default="zstd", help="of the chunks (default: zstd)")
-    parser.add_argument("--chunk-size", metavar="MIB", type=_positive, default=1.0, help="of a chunk (default: 1)")
-    parser.add_argument("--max-size", metavar="MIB", type=_positive, default=0.0, help="begin a new file after so much")
+    parser.add_argument("--chunk-size", metavar="MIB", type=positive, default=1.0, help="of a chunk (default: 1)")
+    parser.add_argument("--max-size", metavar="MIB", type=positive, default=0.0, help="begin a new file after so much")
     parser.add_argument(
-        "--max-duration", metavar="S", type=_positive, default=0.0, help="begin a new file after so long"
+        "--max-duration", metavar="S", type=positive, default=0.0, help="begin a new file after so long"
     )
     parser.add_argument(
         "--queue-size",
         metavar="MIB",
-        type=_positive,
+        type=positive,
         default=64.0,
         help="memory for what waits for the disk (default: 64)",
     )
@@ -75,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         check_free(place.path)
         report = _record(args, place.path)
     for text in _warnings(report):
-        print(f"warning: {text}", file=sys.stderr)
+        warn(text)
     count = sum(report.message_counts.values())
     if args.json:
         print(json.dumps(_to_json(report), indent=2))
@@ -93,16 +94,18 @@ def default_bag() -> PathReservation:
 
 
 def _record(args: argparse.Namespace, path: Path) -> RecordReport:
-    from robot_formation.bag.provenance import git_commit, versions
-    from robot_formation.nodes.host.session import Interrupts, node_session
+    from robot_formation.bag.provenance import versions
+    from robot_formation.nodes.host.session import node_session
     from robot_formation.nodes.recorder.recorder_node import RecorderNode
+    from robot_formation.system.git_commit import git_commit
+    from robot_formation.system.signal_handling import SignalCounter
 
     texts = {"versions": json.dumps(versions()), "git_commit": git_commit()}
     parameters = _parameters(args, path, tuple(f"{key}={text}" for key, text in texts.items()))
-    with Interrupts() as interrupts, node_session("recorder") as node:
-        recorder = RecorderNode(node, parameters, say=_say, warn=_warn, ask=True)
-        _say(f"recording into {path}; Ctrl-C ends")
-        return recorder.run(interrupts)
+    with SignalCounter(1) as signals, node_session("recorder") as node:
+        recorder = RecorderNode(node, parameters, say=say, warn=warn, ask=True)
+        say(f"recording into {path}; Ctrl-C ends")
+        return recorder.run(signals.came)
 
 
 def _parameters(args: argparse.Namespace, path: Path, metadata: tuple[str, ...]) -> RecorderParameters:
@@ -148,22 +151,3 @@ def _to_json(report: RecordReport) -> dict[str, Any]:
         "lost": dict(report.lost),
         "unseen": list(report.unseen),
     }
-
-
-def _warn(text: str) -> None:
-    _say(f"warning: {text}")
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
-def _positive(text: str) -> float:
-    """Convert for argparse, which turns the error into one line."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < 1e9:  # nor is NaN
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number above 0")
-    return value

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
-from robot_formation.cli.parser import number, whole_number
+from robot_formation.cli.option_types import number, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:

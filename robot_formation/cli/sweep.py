@@ -8,12 +8,13 @@ import os
 import re
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
-from robot_formation.cli.parser import Names, whole_number
+from robot_formation.batch.progress_line import with_progress
+from robot_formation.cli.option_types import Names, whole_number
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -195,25 +196,3 @@ def default_folder() -> PathReservation:
     from robot_formation.paths import default_bags_dir
 
     return reserve_new(default_bags_dir(), f"sweep_{time.strftime('%Y%m%d-%H%M%S')}")
-
-
-def with_progress(rows: Iterable[Any], count: int, what: str = "runs") -> Iterator[Any]:
-    """Pass rows on and tell standard error how many there are, how fast they come and how long the rest will take."""
-    began = last = time.monotonic()
-    terminal = sys.stderr.isatty()
-    for number, row in enumerate(rows, 1):
-        yield row
-        now = time.monotonic()
-        if now - last < (0.5 if terminal else 10.0) and number < count:
-            continue
-        last = now
-        rate = number / max(now - began, 1e-9)
-        left = (count - number) / rate
-        text = f"{number}/{count} {what}, {60.0 * rate:.0f} per minute, {_duration(left)} left"
-        print(f"\r{text:<60}" if terminal else text, end="" if terminal and number < count else "\n", file=sys.stderr)
-
-
-def _duration(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
-from robot_formation.cli.parser import whole_number
+from robot_formation.cli.messages import say, warn
+from robot_formation.cli.option_types import whole_number, whole_numbers
 
 DESCRIPTION = """\
 Teach a colour signature from an image: from a rectangle, as "Set signature" does in PixyMon, or growing from a point,
@@ -22,8 +22,8 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser("teach", help="teach a colour signature from an image", description=DESCRIPTION)
     parser.add_argument("image", metavar="IMAGE", type=Path, help="image file, 316 x 208 (others are scaled)")
     place = parser.add_mutually_exclusive_group(required=True)
-    place.add_argument("--region", metavar="X,Y,W,H", type=_numbers(4), help="rectangle to teach")
-    place.add_argument("--point", metavar="X,Y", type=_numbers(2), help="point to grow from")
+    place.add_argument("--region", metavar="X,Y,W,H", type=whole_numbers(4), help="rectangle to teach")
+    place.add_argument("--point", metavar="X,Y", type=whole_numbers(2), help="point to grow from")
     parser.add_argument(
         "--signature",
         metavar="N",
@@ -55,16 +55,16 @@ def run(args: argparse.Namespace) -> int:
     from robot_formation.vision.pixy2.signature_quality import shortcomings
     from robot_formation.vision.pixy2.signatures import load_signatures, save_signatures, teach_point, teach_region
 
-    parameters = read_parameters(args.parameters, _warn) if args.parameters else DetectorParameters()
+    parameters = read_parameters(args.parameters, say) if args.parameters else DetectorParameters()
     kept = load_signatures(args.out) if args.out and args.out.exists() else []
-    picture = read_picture(args.image, _warn)
+    picture = read_picture(args.image, say)
     if args.region:
         signature = teach_region(picture, args.region, args.signature)
     else:
         signature, _ = teach_point(picture, args.point, parameters.signature_teach_threshold, args.signature)
     found = shortcomings(signature, kept, picture, parameters)
     for shortcoming in found:
-        _warn(f"warning: signature {signature.sig}: {shortcoming.text}")
+        warn(f"signature {signature.sig}: {shortcoming.text}")
     if args.out:
         save_signatures(args.out, [*(other for other in kept if other.sig != signature.sig), signature])
     if args.json:
@@ -76,22 +76,3 @@ def run(args: argparse.Namespace) -> int:
         f"{signature.v_max} (1/32768), colour #{signature.rgb:06x}" + (f" -> {args.out}" if args.out else "")
     )
     return 0
-
-
-def _numbers(count: int) -> Any:
-    """An argparse type for a fixed count of integers, separated by commas."""
-
-    def parse(text: str) -> tuple[int, ...]:
-        try:
-            values = tuple(int(part) for part in text.split(","))
-        except ValueError:
-            values = ()
-        if len(values) != count:
-            raise argparse.ArgumentTypeError(f"{text!r} is not {count} whole numbers separated by commas")
-        return values
-
-    return parse
-
-
-def _warn(text: str) -> None:
-    print(text, file=sys.stderr)

@@ -31,7 +31,7 @@ def run_in_memory(
     messages: dict[str, list[Any]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
     now_ns = 0
-    clock = names.absolute("", names.CLOCK_TOPIC.name)
+    clock = names.CLOCK_TOPIC.of()
 
     def listen(topic: str, message: Any) -> None:
         nonlocal now_ns

@@ -18,7 +18,6 @@ from typing import Any, TypeVar
 from robot_formation import conversions, exit_codes
 from robot_formation.bag.bag_path import PathReservation, check_free
 from robot_formation.bag.message_recorder import Recorder
-from robot_formation.bag.qos import TopicQos
 from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import NodeKind
 from robot_formation.components.world import WorldComponent
@@ -111,17 +110,11 @@ class InProcessRun:
         while queue:
             name, topic, message = queue.popleft()
             if self.recorder is not None and (self.images or topic.type != IMAGE_TYPE):
-                self._record(self.recorder, name, topic, message)
+                self.recorder.record_as(name, topic, conversions.to_cdr(message))
             if self.listen is not None:
                 self.listen(name, message)
             for handler in self._handlers.get(name, ()):
                 handler(message)
-
-    def _record(self, recorder: Recorder, name: str, topic: Topic, message: Any) -> None:
-        if name not in recorder.topics:
-            qos = topic.qos
-            recorder.add_topic(name, topic.type, TopicQos(qos.history, qos.depth, qos.reliability, qos.durability))
-        recorder.record(name, topic.type, conversions.to_cdr(message))
 
 
 def run_in_process(

@@ -37,7 +37,7 @@ class IdealRun(InProcessRun):
         self._predicting: set[str] = set()
         self._changes: dict[str, Motion] = {}  # what was commanded in this timestep less what was predicted
         self._camera_errors: dict[str, list[tuple[float, float]]] = defaultdict(list)
-        self._odometry = {names.absolute("", names.ground_truth_odom(robot).name): robot for robot in scenario.robots}
+        self._odometry = {names.ground_truth_odom(robot).of(): robot for robot in scenario.robots}
         world = scenario.world
         self._surface = world.make_surface()
         self._face = TargetFace(Camera(self._surface, world), world)

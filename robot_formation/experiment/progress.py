@@ -83,10 +83,10 @@ class Progress:
         self._handlers: dict[str, Callable[[Any], None]] = {}
         for robot in self._heard:
             self._handlers[f"/{names.ground_truth_pose(robot).name}"] = partial(self._pose, robot)
-            self._handlers[f"/{robot}/{names.MOVED.name}"] = partial(self._moved, robot)
+            self._handlers[names.MOVED.of(robot)] = partial(self._moved, robot)
         for robot in self._followers:
-            self._handlers[f"/{robot}/{names.ALIGNMENT.name}"] = partial(self._alignment, robot)
-            self._handlers[f"/{robot}/{names.DISPLACEMENT.name}"] = partial(self._displacement, robot)
+            self._handlers[names.ALIGNMENT.of(robot)] = partial(self._alignment, robot)
+            self._handlers[names.DISPLACEMENT.of(robot)] = partial(self._displacement, robot)
 
     @property
     def topics(self) -> list[str]:

@@ -10,13 +10,14 @@ from robot_formation import conversions, names
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.message_recorder import METADATA_NAME
-from robot_formation.bag.provenance import git_commit, versions
+from robot_formation.bag.provenance import versions
 from robot_formation.bag.reader import Bag
 from robot_formation.bag.run_details import mapping, node_parameters
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.parameters import from_mapping, specs
+from robot_formation.system.git_commit import git_commit
 
 
 class Recording:
@@ -46,7 +47,7 @@ class Recording:
 
     def has(self, robot: str, topic: names.Topic) -> bool:
         """Tell whether there are messages on a robot's topic."""
-        return absolute(robot, topic) in self._bag.topics
+        return topic.of(robot) in self._bag.topics
 
     def messages(self, robot: str, topic: names.Topic) -> Iterator[Any]:
         """Yield the messages of a robot's topic in the order in which they were sent.
@@ -54,7 +55,7 @@ class Recording:
         Raises:
             BagError: there are none, they have another type, or the bag is corrupted.
         """
-        name = absolute(robot, topic)
+        name = topic.of(robot)
         self._bag.require({name: topic.type})
         for message in self._bag.raw_messages([name]):
             try:
@@ -83,11 +84,6 @@ class Recording:
         known = {name: value for name, value in recorded.items() if name in specs(cls)}
         self.notes += [f"{kind}.{name} is no parameter any more" for name in recorded if name not in known]
         return from_mapping(cls, {**known, **changes}, where=kind)
-
-
-def absolute(robot: str, topic: names.Topic) -> str:
-    """Name a robot's topic in full."""
-    return names.absolute(f"/{robot}", topic.name)
 
 
 def host(kind: str, parameters: Any, robot: str, notes: list[str]) -> tuple[Component, list[tuple[str, Any]]]:

@@ -5,10 +5,7 @@ The table is a CSV file that grows row by row, so that a sweep which was stopped
 
 from __future__ import annotations
 
-import csv
-import json
 import logging
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass, fields
@@ -19,6 +16,7 @@ from typing import Any, NamedTuple
 from robot_formation.analysis.conditions import conditions
 from robot_formation.analysis.quantities import analyse
 from robot_formation.batch.pool import run_parallel
+from robot_formation.batch.resumable_table import ResumableTable, read_record, write_record
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
@@ -27,7 +25,6 @@ from robot_formation.experiment.oracle import IDEAL, IdealRun
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.parameters import suggestion
 from robot_formation.surface import SURFACES
-from robot_formation.system.files import MOST_RECORD_BYTES, read_file, whole_lines
 
 # The comparison's common ground unless --set says otherwise: the paper's fine-tuner, pictures only when waited for.
 CONDITIONS = ("fine_tuner.mode=paper", "world.camera.mode=on_demand", "world.overhead.enabled=false")
@@ -181,39 +178,29 @@ class Table:
         Raises:
             SweepError: if the folder holds something else, or a sweep with other settings.
         """
-        self._path = folder / RUNS_NAME
         record = folder / PLAN_NAME
         if record.exists():
             self._require_same(record, plan)
         elif folder.exists() and any(folder.iterdir()):
             raise SweepError(f"{folder} is not empty and holds no sweep; choose another --out")
         folder.mkdir(parents=True, exist_ok=True)
-        unfinished = record.with_suffix(".partial")
-        unfinished.write_text(json.dumps(asdict(plan), indent=2) + "\n", encoding="utf-8")
-        unfinished.replace(record)
+        write_record(record, asdict(plan))
+        self._table = _table(folder / RUNS_NAME)
         self.rows: dict[Task, Row] = {}
-        if self._path.exists():
-            self.rows = {row.task: row for row in read_rows(self._path)}
-        # Written anew, so that a half-written last line is gone; put in place at once, so that no row ever is.
-        unfinished = self._path.with_suffix(".partial")
-        with unfinished.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow([field.name for field in fields(Row)])
-            writer.writerows(_cells(row) for row in self.rows.values())
-        unfinished.replace(self._path)
+        if self._table.path.exists():
+            self.rows = {row.task: row for row in self._table.read()}
+        self._table.rewrite(self.rows.values())
 
     def add(self, row: Row) -> None:
         """Append a row; it is on disk when this returns."""
         self.rows[row.task] = row
-        with self._path.open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow(_cells(row))
+        self._table.append([row])
 
     @staticmethod
     def _require_same(record: Path, plan: Plan) -> None:
         try:
-            earlier = json.loads(read_file(record, MOST_RECORD_BYTES))
-            settings = [str(setting) for setting in earlier["settings"]]
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            settings = [str(setting) for setting in read_record(record)["settings"]]
+        except (ValueError, KeyError, TypeError):
             raise SweepError(f"{record}: no record of a sweep; choose another --out") from None
         if settings != list(plan.settings):
             differing = _difference(settings, plan.settings)
@@ -235,21 +222,11 @@ def read_rows(path: Path) -> Iterator[Row]:
     Raises:
         SweepError: if the file is no such table.
     """
-    columns = {field.name: str(field.type) for field in fields(Row)}
-    try:
-        whole = list(whole_lines(path))
-    except (OSError, ValueError) as error:
-        raise SweepError(f"{path}: can't read it: {error}") from None
-    if not whole or whole[0].rstrip() != ",".join(columns):
-        raise SweepError(f"{path}: no table of a sweep's runs; choose another --out")
-    reader = csv.reader(whole)
-    next(reader)
-    try:
-        for cells in reader:
-            pairs = zip(columns.items(), cells, strict=True)
-            yield Row(**{name: _value(kind, cell) for (name, kind), cell in pairs})
-    except (ValueError, csv.Error):
-        raise SweepError(f"{path}: line {reader.line_num} can't be read; delete it to run it again") from None
+    return _table(path).read()
+
+
+def _table(path: Path) -> ResumableTable[Row]:
+    return ResumableTable(path, Row, SweepError, "no table of a sweep's runs; choose another --out")
 
 
 def remaining(plan: Plan, rows: Mapping[Task, Row]) -> list[Task]:
@@ -301,19 +278,3 @@ def carry_out_by_dask(tasks: Iterable[Task], settings: Sequence[str], scheduler:
             if problem is not None:
                 raise SweepError(f"a Dask worker can't do the runs: {type(problem).__name__}: {problem}; {_GOES_ON}")
             yield future.result()
-
-
-def _cells(row: Row) -> list[Any]:
-    return ["" if value is None else value for value in asdict(row).values()]
-
-
-def _value(kind: str, text: str) -> Any:
-    if kind == "str":
-        return text
-    if kind == "int":
-        return int(text)
-    if not text:
-        return None
-    if not math.isfinite(number := float(text)):
-        raise ValueError(text)
-    return number

@@ -8,7 +8,7 @@ pair (x, y),
 
 the recursion of Zhang, Rowley, Deem and Cattafesta, "Online dynamic mode decomposition for time-varying systems", SIAM
 J. Appl. Dyn. Syst. 18(3), 2019 (arXiv 1707.02876). It keeps K equal to the least-squares solution Y X^+ of all pairs so
-far, provided that y is *measured*; `koopman/algorithm_1.py` has what the paper prints. With a forgetting factor rho,
+far, provided that y is *measured*; the predictor `literal` is what the paper prints. With a forgetting factor rho,
 
     K <- K + (y - K x) x' P / (rho + x' P x),     P <- (P - P x x' P / (rho + x' P x)) / rho,
 

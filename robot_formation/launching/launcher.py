@@ -5,10 +5,10 @@ from __future__ import annotations
 import contextlib
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation import exit_codes
 from robot_formation.bag.bag_path import PARTIAL_SUFFIX, PathReservation, check_free, recover_hint
@@ -24,7 +24,7 @@ from robot_formation.launching.processes import RECORDER, Process, processes
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
 from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, is_of_domain
-from robot_formation.system.signal_handling import give_back, take
+from robot_formation.system.signal_handling import SignalCounter
 from robot_formation.system.temporary_folder import RUN, temporary_folder
 
 if TYPE_CHECKING:
@@ -65,8 +65,6 @@ class Launcher:
         images: whether pictures are recorded too.
         say: takes the lines of progress.
         silence_s: wall seconds in which no robot does anything, after which the run is given up; longer in slow motion.
-        callback_delay_s: longest random delay before each callback of every node (tests).
-        on_start: called once all processes run, with the ROS domain and the process ids by node name (tests).
         reservation: of the bag's path, if it has been taken already; it is released at the end.
     """
 
@@ -75,11 +73,9 @@ class Launcher:
     images: bool = False
     say: Callable[[str], None] = lambda text: None
     silence_s: float = 90.0
-    callback_delay_s: float = 0.0
-    on_start: Callable[[int, dict[str, int]], None] | None = None
     reservation: PathReservation | None = None
     _children: list[Child] = field(default_factory=list, init=False)
-    _interrupted: int = field(default=0, init=False)
+    _signals: SignalCounter = field(default_factory=SignalCounter, init=False)
     _said_at: float = field(default=0.0, init=False)
 
     def run(self) -> RunResult:
@@ -93,7 +89,7 @@ class Launcher:
             if self.bag is not None:
                 stack.enter_context(self.reservation or PathReservation(self.bag))
                 check_free(self.bag)
-            stack.enter_context(self._signals())
+            stack.enter_context(self._signals)
             folder = stack.enter_context(temporary_folder(RUN))
             domain = stack.enter_context(DomainReservation())
             # Those of every domain: also what a run left whose launcher was killed itself.
@@ -115,14 +111,9 @@ class Launcher:
 
     def _start(self, table: list[Process], folder: Path, environment: dict[str, str]) -> None:
         for process in table:
-            if self._interrupted:
+            if self._signals.count:
                 return
-            if self.callback_delay_s and process.executable != RECORDER:
-                delay = {"callback_delay_s": self.callback_delay_s}
-                process = type(process)(process.executable, process.namespace, {**process.parameters, **delay})
             self._children.append(Child(process, folder, environment))
-        if self.on_start is not None:
-            self.on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in self._children})
 
     def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""
@@ -141,7 +132,7 @@ class Launcher:
                 monitor.spin(_POLL_S)
                 if monitor.messages and not result.startup_s:
                     result.startup_s = time.monotonic() - began
-                if self._interrupted:
+                if self._signals.count:
                     return exit_codes.INTERRUPTED, "interrupted"
                 ended = next((child for child in self._children if child.poll() is not None), None)
                 if ended is not None:
@@ -171,7 +162,7 @@ class Launcher:
             child.signal(signal.SIGCONT)
             if child.process.executable == RECORDER:
                 enough, end = monitor.reports[child.name] + _CAUGHT_UP_REPORTS, time.monotonic() + _CATCH_UP_S
-                while monitor.reports[child.name] < enough and time.monotonic() < end and not self._interrupted:
+                while monitor.reports[child.name] < enough and time.monotonic() < end and not self._signals.count:
                     monitor.spin(_POLL_S)
 
     def _patience_s(self) -> float:
@@ -205,10 +196,10 @@ class Launcher:
             end = time.monotonic() + patience_s
             for child in children:
                 child.signal(number)
-            interrupts = self._interrupted
+            interrupts = self._signals.count
             while any(child.poll() is None for child in children) and time.monotonic() < end:
                 time.sleep(0.01)
-                if self._interrupted > max(interrupts, 1):
+                if self._signals.count > max(interrupts, 1):
                     break  # asked again: no more patience with this signal
 
     def _settle(self, result: RunResult) -> None:
@@ -243,19 +234,3 @@ class Launcher:
         with contextlib.suppress(BagError):
             if missing := missing_messages(result.bag):
                 result.warnings.append(missing)
-
-    @contextlib.contextmanager
-    def _signals(self) -> Iterator[None]:
-        """Count SIGINT, SIGTERM and SIGHUP (unless it is ignored).
-
-        Each after the first shortens the wait for nodes to end in good order.
-        """
-
-        def handler(number: int, frame: Any) -> None:
-            self._interrupted += 1
-
-        before = take(handler)
-        try:
-            yield
-        finally:
-            give_back(before)

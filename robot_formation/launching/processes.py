@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from robot_formation import names
-from robot_formation.bag.provenance import git_commit, versions
+from robot_formation.bag.provenance import versions
 from robot_formation.calibration.camera_check import camera_values
 from robot_formation.calibration.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.parameters import to_mapping
+from robot_formation.system.git_commit import git_commit
 
 RECORDER = "recorder"
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 
 from robot_formation.errors import FormationError
+from robot_formation.system.reservation import reserve
 
 FIRST_PORT = 7400
 PORTS_PER_DOMAIN = 250
@@ -50,7 +51,8 @@ class DomainReservation:
             domain = DOMAINS[(self._start * 37 + step) % len(DOMAINS)]
             if not used.isdisjoint(domain_ports(domain)):
                 continue
-            self._socket = _reserve(domain)
+            with contextlib.suppress(OSError):  # where none can be reserved, none is free
+                self._socket = reserve(f"domain_{domain}")
             if self._socket is not None:
                 return domain
         raise DomainError(
@@ -73,17 +75,6 @@ def free_domain() -> int:
     """
     with DomainReservation(0) as domain:
         return domain
-
-
-def _reserve(domain: int) -> socket.socket | None:
-    """Take the domain's socket; None if another process has it."""
-    taken = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    try:
-        taken.bind(f"\0robot_formation_domain_{domain}")
-    except OSError:
-        taken.close()
-        return None
-    return taken
 
 
 def _used_udp_ports() -> set[int]:

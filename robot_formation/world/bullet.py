@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import sys
+from robot_formation.system.standard_error import silent_stderr
 
-sys.stderr.flush()
-_kept = os.dup(2)
-_nowhere = os.open(os.devnull, os.O_WRONLY)
-os.dup2(_nowhere, 2)
-try:
+with silent_stderr():
     import pybullet
-finally:
-    os.dup2(_kept, 2)
-    os.close(_kept)
-    os.close(_nowhere)
 
 __all__ = ["pybullet"]

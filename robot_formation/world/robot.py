@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 from robot_formation.geometry.orientation import quaternion
 from robot_formation.surface import Surface
@@ -17,8 +16,6 @@ from robot_formation.world.start import RobotStart
 from robot_formation.world.wheel import HELD
 
 SETTLING_ROUNDS = 4
-
-_CHANGING = ("moving", "disturbed", "awake", "timed_out", "held", "_steps_moving", "_steps_resting")
 
 
 class Robot:
@@ -123,26 +120,6 @@ class Robot:
         self.body.freeze()
         self.moving = self.awake = False
         self.held = True
-
-    def save(self) -> dict[str, Any]:
-        """Take everything that changes, but for Bullet's part of the body."""
-        return {
-            **{name: getattr(self, name) for name in _CHANGING},
-            "stop_stream": self._stop_stream.bit_generator.state,
-            "twist": self.body.twist,
-            "encoders": (tuple(self.body.encoder_angles), tuple(self.body.encoder_speeds)),
-            "wheels": tuple(wheel.save() for wheel in self.body.wheels),
-        }
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Put back what `save` took."""
-        for name in _CHANGING:
-            setattr(self, name, state[name])
-        self._stop_stream.bit_generator.state = state["stop_stream"]
-        self.body.twist = state["twist"]
-        self.body.encoder_angles, self.body.encoder_speeds = (list(values) for values in state["encoders"])
-        for wheel, kept in zip(self.body.wheels, state["wheels"], strict=True):
-            wheel.restore(kept)
 
     def disturb(self) -> None:
         """Wake up because something touched the robot."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import cv2
 import numpy as np
@@ -76,20 +74,6 @@ class Sensor:
         self._row_times = READOUT_S / p.height_px * np.arange(p.height_px)
         self._kept_exposure: Exposure | None = None
         self._kept_balance: tuple[float, float, float] | None = None
-
-    def save(self) -> dict[str, Any]:
-        """Take the state: random stream, and exposure and white balance of the first picture."""
-        return {
-            "noise": dict(self._stream.bit_generator.state),
-            "exposure": None if self._kept_exposure is None else tuple(self._kept_exposure),
-            "balance": self._kept_balance,
-        }
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Put back what `save` took."""
-        self._stream.bit_generator.state = dict(state["noise"])
-        self._kept_exposure = None if state["exposure"] is None else Exposure(*state["exposure"])
-        self._kept_balance = state["balance"]
 
     def develop(self, light: Light) -> Development:
         """Expose a picture by `Camera.light`; the first one sets what is not automatic."""

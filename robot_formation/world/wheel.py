@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from robot_formation.world.parameters import DriveMode, MotorParameters
 
@@ -13,21 +11,6 @@ DRIVING = 1
 BRAKING = 2
 _HOLD_SPEED_RAD_S = 0.3
 """Static friction of the gear stops a shorted motor below this speed; what it would still turn is 0.05 mm of travel."""
-
-_CHANGING = (
-    "angle",
-    "speed",
-    "bristle",
-    "state",
-    "drive",
-    "direction",
-    "_start",
-    "_stop_at",
-    "_profile",
-    "_integral",
-    "_time",
-    "_settled",
-)
 
 
 class Wheel:
@@ -100,15 +83,6 @@ class Wheel:
         self._integral = 0.0
         self._time = 0.0
         self._settled = 0
-
-    def save(self) -> dict[str, Any]:
-        """Take everything that changes."""
-        return {name: getattr(self, name) for name in _CHANGING}
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Put back what `save` took."""
-        for name in _CHANGING:
-            setattr(self, name, state[name])
 
     def measured_angle(self) -> float:
         """Angle in whole encoder counts, radians."""

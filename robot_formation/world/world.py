@@ -16,7 +16,6 @@ from robot_formation.world.pose import Pose, off_plate
 from robot_formation.world.robot import Robot
 from robot_formation.world.sensor import Development, Sensor
 from robot_formation.world.start import RobotStart
-from robot_formation.world.state import WorldState, restore_physics, save_physics
 
 MAX_FRAMES_OWED = 600
 
@@ -52,7 +51,6 @@ class World:
         """
         check_setup(surface, robots, parameters, seed)
         self.start_ns = start_ns
-        self._setup = repr((surface, tuple(robots), parameters, seed))
         self.surface = surface
         self.parameters = parameters
         self.step_count = 0
@@ -162,36 +160,6 @@ class World:
         Any mixture of `step` and `advance` gives the same events.
         """
         return self._step(skip=False) if self.owes else []
-
-    def save(self) -> WorldState:
-        """Take the whole state, from which `restore` goes on to the last bit."""
-        return WorldState(
-            self._setup,
-            self.start_ns,
-            self.step_count,
-            save_physics(self._client),
-            {name: robot.save() for name, robot in self._robots.items()},
-            {name: sensor.save() for name, sensor in self._sensors.items()},
-            dict(self._frames_owed),
-            dict(self._pending),
-        )
-
-    def restore(self, state: WorldState) -> None:
-        """Go back (or on) to a state that this world, or one of the same setup, was saved in.
-
-        Raises:
-            WorldError: if the state belongs to a world of another surface, robots, parameters or seed.
-        """
-        if state.setup != self._setup:
-            raise WorldError("the state is of a world of another setup: make one of the same surface, robots and seed")
-        restore_physics(self._client, state.physics)
-        self.start_ns, self.step_count = state.start_ns, state.step_count
-        for name, robot in self._robots.items():
-            robot.restore(state.robots[name])
-        for name, sensor in self._sensors.items():
-            sensor.restore(state.sensors[name])
-        self._pictures.clear()  # they may have been exposed otherwise
-        self._frames_owed, self._pending = dict(state.frames_owed), dict(state.pending)
 
     def close(self) -> None:
         """Free the physics engine; the world can't be used afterwards."""

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from robot_formation.analysis.displacement_log import DisplacementLog, read_log, write_log
 from robot_formation.analysis.errors import AnalysisError
-from robot_formation.analysis.forecasts import CHI_SQUARE_90, error_statistics, forecast_log, inside_ellipse
+from robot_formation.analysis.forecasts import error_statistics, forecast_log, inside_ellipse
+from robot_formation.analysis.quantiles import ELLIPSE_90
 from robot_formation.koopman.predictors import NAMES, PredictorParameters
 
 FULL = "u_m,v_m,residual_u_m,residual_v_m,commanded_u_m,commanded_v_m"
@@ -253,8 +254,8 @@ def test_the_ellipse_is_that_of_the_inverse_covariance(
     mixed = correlation * sigma_u * sigma_v
     covariance = np.array([[sigma_u**2, mixed], [mixed, sigma_v**2]])
     size = error @ np.linalg.solve(covariance, error)
-    if abs(size - CHI_SQUARE_90) > 1e-6:
-        assert inside_ellipse(error[None], covariance[None])[0] == (size < CHI_SQUARE_90)
+    if abs(size - ELLIPSE_90) > 1e-6:
+        assert inside_ellipse(error[None], covariance[None])[0] == (size < ELLIPSE_90)
 
 
 def test_a_covariance_of_zero_holds_only_an_error_of_zero() -> None:

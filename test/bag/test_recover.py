@@ -31,7 +31,8 @@ def write_chunks(path: Path, compression: str = "zstd") -> list[int]:
             writer.write("/words", bytes(STORE.serialize_cdr(text(f"word {number}"), STRING)), number // 2)
             if number % PER_CHUNK == PER_CHUNK - 1:
                 writer.end_chunk()
-                sizes.append((writer.partial_path / writer.file_name).stat().st_size)
+                (file,) = writer.partial_path.glob("*.mcap")
+                sizes.append(file.stat().st_size)
     return sizes
 
 

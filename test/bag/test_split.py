@@ -117,7 +117,8 @@ def test_a_full_chunk_is_ended_by_itself_and_survives(tmp_path: Path) -> None:
         writer.write("/words", cdr("x" * 1000), number)
     assert writer.open_bytes < 5000
     dead = tmp_path / "dead.mcap"
-    dead.write_bytes((writer.partial_path / writer.file_name).read_bytes())
+    (written,) = writer.partial_path.glob("*.mcap")
+    dead.write_bytes(written.read_bytes())
     writer.discard()
     assert list(tmp_path.iterdir()) == [dead]
     assert recover(dead, tmp_path / "saved").messages == 8

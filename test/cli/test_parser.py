@@ -6,7 +6,8 @@ import pytest
 from _pytest.capture import CaptureResult
 
 from robot_formation.cli.main import main
-from robot_formation.cli.parser import Names, Parser, number, whole_number
+from robot_formation.cli.option_types import Names, number, whole_number
+from robot_formation.cli.parser import Parser
 
 
 def ended(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, CaptureResult[str]]:

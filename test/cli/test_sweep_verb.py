@@ -14,7 +14,7 @@ from _pytest.capture import CaptureResult
 
 from robot_formation import paths
 from robot_formation.cli.main import main
-from robot_formation.cli.sweep import default_folder, seeds_text, with_progress
+from robot_formation.cli.sweep import default_folder, seeds_text
 from robot_formation.experiment import sweep
 from robot_formation.experiment.sweep import Row, Task
 
@@ -235,12 +235,6 @@ def test_with_five_seeds_nothing_is_warned_of(
     said = call(capsys, *CHOICE[:-1], "0:5", "--jobs", 1, "--out", tmp_path / "out")[1]
     assert "warning" not in said.err
     assert said.err.startswith("seeds 0 to 4 (5 seeds)\n")
-
-
-def test_progress_passes_rows_on_and_tells_the_last_always(capsys: pytest.CaptureFixture[str]) -> None:
-    assert list(with_progress(iter("abc"), 3)) == ["a", "b", "c"]
-    lines = capsys.readouterr().err.splitlines()
-    assert lines[-1].startswith("3/3 runs, ")
 
 
 # --- mistakes ---------------------------------------------------------------------------------------------------------

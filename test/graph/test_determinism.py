@@ -1,10 +1,12 @@
 """The same scenario and seed give the same run to the last bit, whatever the machine does meanwhile."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 from graph_tools import BusyCores, displacements, launch, short_scenario
+from repository import HELPERS
 from robot_formation.experiment.in_process import run_in_process
 
 pytestmark = pytest.mark.graph
@@ -43,12 +45,21 @@ def test_loaded_cores_change_nothing(tmp_path: Path, in_process: dict[str, Displ
 
 @pytest.mark.parametrize(("mode", "timesteps"), [("on_demand", 4), ("stream", 2)])
 def test_random_delays_in_every_callback_change_nothing(
-    tmp_path: Path, in_process: dict[str, Displacements], mode: str, timesteps: int
+    tmp_path: Path,
+    in_process: dict[str, Displacements],
+    monkeypatch: pytest.MonkeyPatch,
+    mode: str,
+    timesteps: int,
 ) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(HELPERS / "slow_callbacks"), prepend=os.pathsep)
+    monkeypatch.setenv("SLOW_CALLBACKS", str(tmp_path))
+    pids: dict[str, int] = {}
     scenario = short_scenario(f"world.camera.mode={mode}", f"leader.timesteps={timesteps}")
-    result = launch(scenario, tmp_path / "bag", callback_delay_s=0.05)
+    result = launch(scenario, tmp_path / "bag", on_start=lambda domain, started: pids.update(started))
     assert result.exit_code == 0
     assert displacements(tmp_path / "bag") == in_process[mode][:timesteps]
+    slowed = {name for name, pid in pids.items() if (tmp_path / str(pid)).exists()}
+    assert slowed == set(pids) - {"/recorder"}
 
 
 def test_another_seed_gives_another_run(tmp_path: Path, in_process: dict[str, Displacements]) -> None:

@@ -53,7 +53,7 @@ def test_a_node_drops_bad_pictures_takes_parameters_and_reports_rate_and_time(la
     assert not refused.successful
     assert "min_block_area" in refused.reason
     assert "missing.yaml" in set_parameter(lab, signatures_file=str(tmp_path / "missing.yaml")).reason
-    assert "used while the node starts" in set_parameter(lab, callback_delay_s=1.0).reason
+    assert "used while the node starts" in set_parameter(lab, wait_for_listeners_s=1.0).reason
     assert set_parameter(lab, min_block_area=2500).successful
     pictures.publish(image(4))
     lab.until(lambda: len(blocks) == 4)

@@ -36,9 +36,21 @@ def displacements(bag):
     ]
 
 
-def launch(scenario, bag, **options):
-    """Run a scenario through the node graph; returns the result."""
-    return Launcher(scenario, bag, **options).run()
+def launch(scenario, bag, *, on_start=None, **options):
+    """Run a scenario through the node graph; returns the result.
+
+    Once all processes run, `on_start` is called with the ROS domain and the process ids by node name.
+    """
+    launcher = Launcher(scenario, bag, **options)
+    start = launcher._start
+
+    def observed(table, folder, environment):
+        start(table, folder, environment)
+        if on_start is not None:
+            on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in launcher._children})
+
+    launcher._start = observed
+    return launcher.run()
 
 
 def formation(*arguments, timeout=300, **options):

@@ -6,3 +6,4 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "robot_formation"
 BENCH = ROOT / "bench"
 DATA = ROOT / "test" / "data"
+HELPERS = ROOT / "test" / "helpers"

@@ -9,6 +9,7 @@ import numpy as np
 from repository import ROOT
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.pixy2.parameters import DetectorParameters
+from robot_formation.vision.pixy2.picture import checked
 from robot_formation.vision.pixy2.signatures import Signature
 
 DATA = ROOT / "test" / "data" / "pixy2"
@@ -56,3 +57,10 @@ def random_picture(rng):
     speckled = rng.random((208, 316)) < rng.choice((0.0, 0.01, 0.2))
     image[speckled] = rng.integers(0, 256, (np.count_nonzero(speckled), 3))
     return np.clip(image, 0, 255).astype(np.uint8)
+
+
+def row_segments(detector, picture):
+    """A detector's row segments (signature, row, start cell, length) in the order of the scan; a cell is 2 x 1 px."""
+    found = detector._scanner.scan(checked(picture))
+    columns = (found.signature, found.row, found.start, found.end - found.start)
+    return list(zip(*(column.tolist() for column in columns), strict=True))

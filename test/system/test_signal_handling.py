@@ -6,10 +6,7 @@ import sys
 
 import pytest
 
-from graph_tools import short_scenario
-from robot_formation.launching.launcher import Launcher
-from robot_formation.nodes.host.session import Interrupts
-from robot_formation.system.signal_handling import ENDING, give_back, take
+from robot_formation.system.signal_handling import ENDING, SignalCounter, give_back, take
 
 NODE = """
 import signal, sys
@@ -55,16 +52,26 @@ def test_an_ignored_hangup_stays_ignored(handlers):
 
 
 @pytest.mark.parametrize("ignored", [True, False])
-def test_a_launcher_and_a_verb_with_a_node_count_a_hangup_unless_it_is_ignored(handlers, ignored):
+def test_a_hangup_is_counted_unless_it_is_ignored(handlers, ignored):
     if ignored:
         ignore_hangup()
-    launcher = Launcher(short_scenario(), None)
-    with launcher._signals():
+    with SignalCounter() as signals:
         signal.raise_signal(signal.SIGHUP)
-        assert launcher._interrupted == (0 if ignored else 1)
-    with Interrupts() as interrupts:
-        signal.raise_signal(signal.SIGHUP)
-        assert interrupts() is not ignored
+        assert signals.count == (0 if ignored else 1)
+        assert signals.came() is not ignored
+
+
+def test_signals_beyond_the_patience_interrupt(handlers):
+    with SignalCounter() as signals:
+        for _ in range(3):
+            signal.raise_signal(signal.SIGINT)
+        assert signals.count == 3
+    with SignalCounter(1) as signals:
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        assert signals.count == 2
+    assert {number: signal.getsignal(number) for number in ENDING} == handlers
 
 
 @pytest.mark.parametrize(("ignored", "printed"), [(True, "False True"), (False, "True True")])

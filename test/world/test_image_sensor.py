@@ -1,7 +1,6 @@
 """Exposure, flicker, white balance and noise of the cameras, each against a formula or what its name promises."""
 
 import math
-import pickle
 
 import numpy as np
 import pytest
@@ -289,32 +288,6 @@ def test_extreme_light_gives_a_picture_of_finite_levels(brightness, lux, light, 
     if lux * light == 0.0:
         assert picture.mean() < 10.0
         assert development.exposure.gain == MAX_GAIN
-
-
-@pytest.mark.parametrize(
-    "automatic",
-    [{}, {"auto_exposure_correction": False, "auto_white_balance": False}, {"flicker_avoidance": False}],
-    ids=["automatic", "kept", "bands"],
-)
-@pytest.mark.parametrize("frames_before", [0, 2])
-def test_a_restored_world_goes_on_with_the_same_pictures_to_the_last_bit(automatic, frames_before):
-    camera = {"light_colour_rgb": TUNGSTEN, "illuminance_lux": 1000.0, **automatic}
-
-    def frames(a_world, count):
-        a_world.request_frames("follower_1", count)
-        return [event.image for event in of_kind(run(a_world), Frame)]
-
-    a_world = world(camera=camera)
-    if frames_before:
-        frames(a_world, frames_before)
-    a_world.command("leader", (6.0,) * 4, (4.0,) * 4)
-    state = pickle.loads(pickle.dumps(a_world.save()))
-    run(a_world)
-    first = frames(a_world, 3)
-    for other in (a_world, world(camera=camera)):
-        other.restore(state)
-        run(other)
-        assert all(np.array_equal(a, b) for a, b in zip(first, frames(other, 3), strict=True))
 
 
 def test_a_frame_rate_that_is_no_whole_number_of_steps_is_refused_in_one_sentence():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import random
 import sys
 import time
 from collections.abc import Callable
@@ -145,7 +144,6 @@ class Host:
         self._repetitions = Repetitions()
         self._transform_topics = transform_topics() if kind == "world" else []
         self._transforms = LiveTransforms(node.get_namespace()) if self._transform_topics else None
-        self._delays = random.Random(os.getpid())
         self._publishers: dict[names.Topic, Any] = {}
         self._heard_s = time.monotonic()
         self._connect()
@@ -157,7 +155,7 @@ class Host:
             self._publishers[topic] = publisher
             self._outbox.add(topic, publisher)
         for entry in self._component.inputs():
-            self._subscribe(entry.topic, self._heard(self._delayed(entry.handler)))
+            self._subscribe(entry.topic, self._heard(entry.handler))
         refuse_unused_overrides(node)
         for name, service in self._component.services().items():
             node.create_service(Trigger, name, partial(_trigger, service))
@@ -233,17 +231,6 @@ class Host:
         if now - self._heard_s > self._component.patience_s and self._component.exit_code is None:
             self._heard_s = now
             self._component.stalled()
-
-    def _delayed(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
-        longest = self._parameters.callback_delay_s
-        if longest <= 0.0:
-            return handler
-
-        def slow(message: Any) -> None:
-            time.sleep(self._delays.uniform(0.0, longest))
-            handler(message)
-
-        return slow
 
     def _set_parameters(self, parameters: Any) -> None:
         self._component.set_parameters(parameters)

@@ -55,13 +55,6 @@ class HostParameters:
     )
     recorder: str = parameter("", "Name of a recorder that must listen too before anything is sent; empty: none")
     record_images: bool = parameter(False, "Whether that recorder records images")
-    callback_delay_s: float = parameter(
-        0.0,
-        "Longest random delay before each callback, to show that results don't depend on it",
-        unit="s",
-        low=0.0,
-        high=10.0,
-    )
 
 
 class ParameterNode(Node):

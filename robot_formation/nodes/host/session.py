@@ -5,9 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
-import signal
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Any
 
 import rclpy
@@ -19,7 +17,6 @@ from rclpy.signals import SignalHandlerOptions
 from robot_formation.errors import FormationError
 from robot_formation.network.loopback import stay_here
 from robot_formation.network.shared_memory import TracingFiles
-from robot_formation.system.signal_handling import give_back, take
 
 
 @contextlib.contextmanager
@@ -63,31 +60,3 @@ def node_session(name: str, *, namespace: str = "", **options: Any) -> Iterator[
         del node, context
         gc.collect()
         tracing.remove_new()
-
-
-class Interrupts:
-    """Counts SIGINT, SIGTERM and SIGHUP (unless it is ignored), so that work ends in good order; the second one
-    interrupts it. A context manager; call it to ask whether one has come.
-    """
-
-    def __init__(self) -> None:
-        self._count = 0
-        self._before: dict[signal.Signals, Any] = {}
-
-    def __call__(self) -> bool:
-        """Tell whether a signal has come."""
-        return self._count > 0
-
-    def __enter__(self) -> Interrupts:
-        self._before = take(self._take)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        give_back(self._before)
-
-    def _take(self, number: int, frame: Any) -> None:
-        self._count += 1
-        if self._count > 1:
-            raise KeyboardInterrupt

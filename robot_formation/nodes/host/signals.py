@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import signal
 import sys
-from typing import Any
 
 from robot_formation import exit_codes
 from robot_formation.network.shared_memory_space import SharedMemoryError, require_space
-from robot_formation.system.signal_handling import ENDING, take
+from robot_formation.system.signal_handling import ENDING, SignalCounter
 
-_stop = False
+_signals = SignalCounter()
 
 
 def stop_on_signals() -> None:
@@ -18,12 +17,7 @@ def stop_on_signals() -> None:
 
     Ends the process where ROS can't be loaded.
     """
-
-    def handler(number: int, frame: Any) -> None:
-        global _stop
-        _stop = True
-
-    take(handler)
+    _signals.install()
     try:
         require_space()
     except SharedMemoryError as error:
@@ -41,4 +35,4 @@ def ignore_signals() -> None:
 
 def stopped() -> bool:
     """Tell whether a signal has asked this process to end."""
-    return _stop
+    return _signals.came()

@@ -75,9 +75,9 @@ class OverheadTracker:
     """From pictures to the places of named dots.
 
     Each robot keeps the dot that is nearest to where its own is expected, robots and dots paired so that the sum of
-    squared distances is least (Kuhn and Munkres). A robot whose dot is not found keeps its last place until a dot
-    appears within reach that is nobody else's; its reach grows by the gate with every picture. If dots are missing
-    where they are expected, but there is one near every robot's start, then the robots have been put back.
+    squared distances is least. A robot whose dot is not found keeps its last place until a dot appears within reach
+    that is nobody else's; its reach grows by the gate with every picture. If dots are missing where they are expected,
+    but there is one near every robot's start, then the robots have been put back.
 
     Attributes:
         tracks: what is known of each robot's dot.
@@ -88,6 +88,9 @@ class OverheadTracker:
         self, parameters: OverheadTrackingParameters, surface: Surface, starts: Mapping[str, tuple[float, float]]
     ) -> None:
         """Begin with robots' starts: base_link's (x, y) in the world, metres, by name."""
+        # Takes 0.3 s: not when the module is imported, for who reads the parameters only; nor at the first picture.
+        import scipy.optimize  # noqa: F401
+
         self.configure(parameters, surface, starts)
         self.tracks: dict[str, DotTrack] = {}
         self.restarted = False
@@ -164,8 +167,6 @@ def _squares(expected: Array, places: Array) -> Array:
 def assign(costs: Array, limit: float) -> list[int | None]:
     """Pair rows with columns at the least total cost; a pair dearer than `limit` stays apart, at that price.
 
-    Shortest augmenting paths, O(rows^2 (columns + rows)) (Kuhn 1955, Munkres 1957).
-
     Args:
         costs: (rows, columns), may be without columns.
         limit: price of a row without column.
@@ -173,32 +174,8 @@ def assign(costs: Array, limit: float) -> list[int | None]:
     Returns:
         Each row's column, or None.
     """
+    from scipy.optimize import linear_sum_assignment
+
     rows, columns = costs.shape
-    table = np.hstack([np.minimum(costs, 1e6 * limit), np.full((rows, rows), limit)])
-    table[:, :columns][costs > limit] = 1e6 * limit
-    total = columns + rows
-    row_price, column_price = np.zeros(rows + 1), np.zeros(total + 1)
-    owner = np.full(total + 1, -1)  # the last column stands for the row that is being added
-    for row in range(rows):
-        owner[total] = row
-        current, way = total, np.full(total, total)
-        least, used = np.full(total, np.inf), np.zeros(total + 1, bool)
-        while owner[current] >= 0:
-            used[current] = True
-            cost = table[owner[current]] - row_price[owner[current]] - column_price[:total]
-            better = ~used[:total] & (cost < least)
-            least[better], way[better] = cost[better], current
-            nearest = int(np.argmin(np.where(used[:total], np.inf, least)))
-            step = least[nearest]
-            row_price[owner[used]] += step
-            column_price[used] -= step
-            least[~used[:total]] -= step
-            current = nearest
-        while current != total:
-            owner[current] = owner[way[current]]
-            current = int(way[current])
-    result: list[int | None] = [None] * rows
-    for column in range(columns):
-        if owner[column] >= 0:
-            result[owner[column]] = column
-    return result
+    table = np.hstack([np.where(costs > limit, 1e6 * limit, costs), np.full((rows, rows), limit)])
+    return [int(column) if column < columns else None for column in linear_sum_assignment(table)[1]]

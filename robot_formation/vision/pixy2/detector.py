@@ -106,16 +106,6 @@ class BlockDetector:
         """
         return limited(self._reported, sigmap, max_blocks)
 
-    def row_segments(self, picture: Any) -> list[tuple[int, int, int, int]]:
-        """Row segments (signature, row, start cell, length) in the order of the scan; a cell is 2 x 1 pixels.
-
-        Raises:
-            PictureError: if the picture has another shape or type.
-        """
-        found = self._scanner.scan(checked(picture))
-        columns = (found.signature, found.row, found.start, found.end - found.start)
-        return list(zip(*(column.tolist() for column in columns), strict=True))
-
     def _boxes(self, segments: Segments) -> list[Box]:
         """Blobs per signature, filtered, merged, without nested ones; then colour codes."""
         parameters = self._parameters

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
-import os
 import re
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +18,7 @@ from robot_formation.errors import shown
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.system.files import read_file
 from robot_formation.system.png_files import png_head, unpacks_within
+from robot_formation.system.standard_error import diverted_stderr
 from robot_formation.system.yaml_files import read_yaml
 from robot_formation.vision.pixy2.parameters import SIGNATURES, DetectorParameters
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, Picture, PictureError, same_shape, scaled
@@ -37,7 +36,6 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "PPM", "GIF")
 _MOST_PIXELS = 50_000_000
 _MOST_BYTES = 256 << 20
 _MOST_HEAD_BYTES = 1 << 20
-_STDERR = 2
 _MOST_COMPLAINTS = 4096
 _RANGE = re.compile(rf"signature_([1-{SIGNATURES}])_range")
 
@@ -112,7 +110,7 @@ def check_readable(path: str | Path) -> None:
 def _decoded(content: bytes) -> tuple[Picture | None, list[str]]:
     """Decode an image file's bytes: BGR or None, and what the image libraries complain about."""
     with tempfile.TemporaryFile() as printed:
-        with _standard_error_to(printed.fileno()):
+        with diverted_stderr(printed):  # image libraries print about damaged files
             try:
                 image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
             except (cv2.error, MemoryError):
@@ -121,22 +119,6 @@ def _decoded(content: bytes) -> tuple[Picture | None, list[str]]:
         lines = printed.read(_MOST_COMPLAINTS).decode(errors="replace").splitlines()
     picture = None if image is None else image.astype(np.uint8, copy=False)
     return picture, [line for line in lines if line.strip()]
-
-
-@contextlib.contextmanager
-def _standard_error_to(target: int) -> Iterator[None]:
-    """Divert standard error: image libraries print about damaged files, past Python's sys.stderr."""
-    try:
-        kept = os.dup(_STDERR)
-    except OSError:  # it is closed, so that nothing can be printed
-        yield
-        return
-    try:
-        os.dup2(target, _STDERR)
-        yield
-    finally:
-        os.dup2(kept, _STDERR)
-        os.close(kept)
 
 
 def read_parameters(path: str | Path, warn: Callable[[str], None]) -> DetectorParameters:

@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import PictureError
-from vision_helpers import BLUE, GREEN, GROUPS, RED, canvas, random_picture
+from vision_helpers import BLUE, GREEN, GROUPS, RED, canvas, random_picture, row_segments
 
 WIDE = DetectorParameters(signature_range=(15.0, 20.0, 20.0), min_block_area=4)
 DETECTOR = BlockDetector(GROUPS["G1"], WIDE)
@@ -130,4 +130,4 @@ def test_a_picture_of_another_shape_or_type_is_refused_in_one_line(image):
 def test_a_view_with_gaps_is_read_like_its_copy():
     large = np.random.default_rng(3).integers(0, 256, (416, 632, 3), np.uint8)
     view = large[::2, ::2]
-    assert DETECTOR.row_segments(view) == DETECTOR.row_segments(view.copy())
+    assert row_segments(DETECTOR, view) == row_segments(DETECTOR, view.copy())

@@ -7,7 +7,7 @@ import pytest
 from robot_formation.vision.pixy2.color_table import run_time_bounds
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.signatures import teach_point, teach_region
-from vision_helpers import EXAMPLES, GROUPS, PARAMETERS, picture
+from vision_helpers import EXAMPLES, GROUPS, PARAMETERS, picture, row_segments
 
 
 def by_area(blocks):
@@ -45,7 +45,7 @@ def test_a_picture_shown_twice_gives_the_blocks_of_the_example(example, name):
 @pytest.mark.parametrize("example", EXAMPLES["images"], ids=label)
 def test_row_segments_are_those_of_the_example(example):
     detector = BlockDetector(GROUPS[example["group"]], PARAMETERS["paper"])
-    segments = detector.row_segments(picture(example["image"]))
+    segments = row_segments(detector, picture(example["image"]))
     assert [list(segment) for segment in segments] == example["row_segments_paper"]
 
 
