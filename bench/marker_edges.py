@@ -18,9 +18,7 @@ from joblib import Parallel, delayed
 
 from bench.alignment_grid import equipment
 from robot_formation import names
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.alignment.precise.marker_edges import (
-    PICTURE_WIDTH_PX,
     Edge,
     EdgeParameters,
     mean_boxes,
@@ -28,14 +26,16 @@ from robot_formation.alignment.precise.marker_edges import (
 )
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
 from robot_formation.calibration.alignment_trial import FOLLOWER, Start, poses
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.picture import WIDTH
 from robot_formation.world import WorldError
 from robot_formation.world.events import Frame
 from robot_formation.world.world import World
 
 MODEL, EDGES = MarkerModel(GeometryParameters()), EdgeParameters()
-OUTER = {FRONT: "right", REAR: "left"}
-NAMES = {TARGET: "Target", FRONT: "Front", REAR: "Rear"}
+OUTER = {Face.FRONT: "right", Face.REAR: "left"}
+NAMES = {Face.TARGET: "Target", Face.FRONT: "Front", Face.REAR: "Rear"}
 
 
 def near(rng):
@@ -96,24 +96,24 @@ def errors(found):
     edges, shown = defaultdict(list), defaultdict(list)
     for state, boxes in found:
         columns, widths = MODEL.pixels(state[None])[0, :, 0], MODEL.widths(state)
-        if TARGET not in boxes or columns.min() < 3.0 or columns.max() > PICTURE_WIDTH_PX - 4.0:
+        if Face.TARGET not in boxes or columns.min() < 3.0 or columns.max() > WIDTH - 4.0:
             continue
-        target = boxes[TARGET]
+        target = boxes[Face.TARGET]
         view = "clear" if EDGES.clear(target) else "rough"
         for face, side in OUTER.items():
             shown[face].append((widths[face], face in boxes))
             if face in boxes:
-                band = EDGES.front_band if face == FRONT else EDGES.rear_band
+                band = EDGES.front_band if face == Face.FRONT else EDGES.rear_band
                 where = f"band {band(boxes[face].width)}" if view == "clear" else "any width"
                 edges[f"{NAMES[face]} {side}, {view}, {where}"].append(_error(state, boxes, face, side))
-        if FRONT in boxes:
-            edges["Front left"].append(_error(state, boxes, FRONT, "left"))
+        if Face.FRONT in boxes:
+            edges["Front left"].append(_error(state, boxes, Face.FRONT, "left"))
             continue
-        edges["Target left, no Front"].append(_error(state, boxes, TARGET, "left"))
-        hidden = min(10, math.floor(max(0.0, widths[FRONT])))
-        edges[f"Target right, Front of {hidden:2d} px not reported"].append(_error(state, boxes, TARGET, "right"))
+        edges["Target left, no Front"].append(_error(state, boxes, Face.TARGET, "left"))
+        hidden = min(10, math.floor(max(0.0, widths[Face.FRONT])))
+        edges[f"Target right, Front of {hidden:2d} px not reported"].append(_error(state, boxes, Face.TARGET, "right"))
         for side in ("top", "bottom"):
-            edges[f"Target {side}, no Front"].append(_error(state, boxes, TARGET, side))
+            edges[f"Target {side}, no Front"].append(_error(state, boxes, Face.TARGET, side))
     return edges, shown
 
 

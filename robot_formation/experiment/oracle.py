@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from robot_formation import conversions, names
-from robot_formation.alignment.paper_rules import AlignmentParameters
+from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.components.fine_tuner import FineTunerNodeParameters
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.components.world import WorldNodeParameters

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from robot_formation.alignment.modes import AlignmentMode, PaperMode
-from robot_formation.alignment.paper_rules import AlignmentParameters, Decision, Verdict
+from robot_formation.alignment.mode import AlignmentMode, Decision, Verdict
+from robot_formation.alignment.paper_mode import AlignmentParameters, PaperMode
 from robot_formation.alignment.precise.precise_mode import PreciseAlignment, PreciseParameters
 from robot_formation.follower.alignment_state import AlignmentState, State
 from robot_formation.geometry.se2 import Motion

@@ -5,7 +5,7 @@ import pytest
 
 from component_helpers import wired
 from robot_formation import conversions
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET, bounding_boxes
+from robot_formation.alignment.observation import bounding_boxes
 from robot_formation.components.block_detector import BlockDetectorNodeParameters
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
@@ -13,7 +13,7 @@ from robot_formation.experiment.scenario import load, load_track, node_defaults,
 from robot_formation.parameters import ParameterError, flatten, from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
-from robot_formation.vision.aruco_patterns import Face
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.picture import PictureError
 from robot_formation.world import Camera, Sensor, WorldParameters, pose_on_surface
@@ -75,13 +75,13 @@ def second_look(wire, picture, first=1):
 
 def test_in_formation_the_target_face_is_a_block_of_50_px_50_px_above_the_centre(bench, wire):
     (block,) = second_look(wire, bench.picture())
-    assert (block.signature, block.angle) == (TARGET, 0)
+    assert (block.signature, block.angle) == (Face.TARGET, 0)
     assert (block.x, block.y) == pytest.approx((157.5, 53.4), abs=2.0)
     assert (block.width, block.height) == pytest.approx((50, 50), abs=4.0)
 
 
 @needs_tags
-@pytest.mark.parametrize(("yaw", "faces"), [(-0.7, {TARGET, FRONT}), (0.7, {TARGET, REAR})])
+@pytest.mark.parametrize(("yaw", "faces"), [(-0.7, {Face.TARGET, Face.FRONT}), (0.7, {Face.TARGET, Face.REAR})])
 def test_signatures_name_the_same_faces_and_boxes_nearly_agree(bench, wire, yaw, faces):
     found = bounding_boxes(second_look(wire, bench.picture(0.0, 0.34, yaw)))
     assert set(found) == faces
@@ -91,10 +91,6 @@ def test_signatures_name_the_same_faces_and_boxes_nearly_agree(bench, wire, yaw,
         # Where two colours meet, the colours' boxes are off by up to 9 px.
         for side, most_px in (("left", 10.0), ("right", 10.0), ("top", 6.0), ("bottom", 6.0)):
             assert getattr(found[face], side) == pytest.approx(getattr(theirs[face], side), abs=most_px)
-
-
-def test_the_faces_of_the_tags_are_the_signatures_of_the_fine_tuner():
-    assert (Face.TARGET, Face.FRONT, Face.REAR) == (TARGET, FRONT, REAR)
 
 
 def test_index_stays_and_age_counts_while_a_block_moves(bench, wire):

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET, Box
+from robot_formation.alignment.observation import FaceBox
 from robot_formation.alignment.precise.marker_edges import EdgeParameters, View, one_marker, view
 from robot_formation.alignment.precise.marker_projection import (
     CURVATURE,
@@ -33,6 +33,7 @@ from robot_formation.alignment.precise.marker_projection import (
 from robot_formation.alignment.precise.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 _KEPT_COST = 16.0
@@ -41,7 +42,6 @@ _GATE_PX = 15.0
 _MOST_INFLATION = 30.0
 _NIS_GAIN = 0.5
 _HYPOTHESES = 50
-FACES = (TARGET, FRONT, REAR)
 
 
 @dataclass(frozen=True)
@@ -231,7 +231,7 @@ class PoseFilter:
 
     # --- looks ------------------------------------------------------------------------------------------------------
 
-    def look(self, boxes: dict[int, Box]) -> None:
+    def look(self, boxes: dict[Face, FaceBox]) -> None:
         """Take a look's boxes, at least one."""
         if self._stepped and self.hypotheses:
             self._nis += _NIS_GAIN * (self.nis(boxes) - self._nis)
@@ -257,7 +257,7 @@ class PoseFilter:
         return one_marker(kept, lambda block: math.hypot(block.x - expected[0], block.y - expected[1]))
 
     def _expects(self, hypothesis: Hypothesis, block: Block) -> bool:
-        if block.signature not in FACES:
+        if block.signature not in set(Face):
             return False
         corners = self._model.pixels(hypothesis.state[None])[0]
         spread = 3.0 * math.sqrt(float(np.trace(hypothesis.covariance[:2, :2]))) + 0.5 * math.sqrt(
@@ -267,18 +267,18 @@ class PoseFilter:
         low, high = corners.min(axis=0) - gate, corners.max(axis=0) + gate
         return bool(low[0] <= block.x <= high[0] and low[1] <= block.y <= high[1])
 
-    def nis(self, boxes: dict[int, Box]) -> float:
+    def nis(self, boxes: dict[Face, FaceBox]) -> float:
         """Normalised innovation squared (NIS) of a look, per edge; 1 is expected of a consistent filter."""
         return self._looks.nis(self.hypotheses, view(boxes, self._edges))
 
-    def whole(self, boxes: dict[int, Box]) -> bool:
+    def whole(self, boxes: dict[Face, FaceBox]) -> bool:
         """Whether a look's boxes, at least one, fit together for some pose: not those of a partly covered marker."""
         seen = view(boxes, self._edges)
         guesses = sorted(self._guesses(boxes), key=lambda guess: abs(guess.state[YAW]))  # the likeliest first
         return any(self._looks.fits(guess, seen) for guess in guesses)
 
-    def _guesses(self, boxes: dict[int, Box]) -> list[Hypothesis]:
-        face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
+    def _guesses(self, boxes: dict[Face, FaceBox]) -> list[Hypothesis]:
+        face = Face.TARGET if Face.TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
         box = boxes[face]
         guesses = []
         for degrees in range(-92, 93, 4):

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_formation.alignment.paper_rules import FRONT, TARGET
-from robot_formation.alignment.precise.marker_edges import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, sliver
+from robot_formation.alignment.precise.marker_edges import Edge, EdgeParameters, View, hidden, sliver
 from robot_formation.alignment.precise.marker_projection import SIZE, YAW, MarkerModel, Matrix, Vector, X, Y
+from robot_formation.vision.marker_face import Face
+from robot_formation.vision.pixy2.picture import WIDTH
 
 _ITERATIONS = 6
 _STRAY_SIGMAS = 1.5
@@ -107,18 +108,18 @@ class LookUpdate:
 
     def _trusted(self, state: Vector, seen: View) -> list[Edge]:
         """List the edges; a Front face that is not reported may shift the Target block's right one."""
-        if FRONT in seen.faces or (front_px := self._model.widths(state)[FRONT]) <= 0.0:
+        if Face.FRONT in seen.faces or (front_px := self._model.widths(state)[Face.FRONT]) <= 0.0:
             return list(seen.edges)
         return [
-            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (TARGET, "right") else edge
+            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (Face.TARGET, "right") else edge
             for edge in seen.edges
         ]
 
     def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
         """List the bounds on faces that were not reported which a state breaks."""
         columns = self._model.pixels(state[None])[0, :, 0]
-        cut = columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX
-        shown, spare = self._model.shown(state, (0.0, PICTURE_WIDTH_PX)), _BORDER_PX if cut else 0.0
+        cut = columns.min() < 0.0 or columns.max() > WIDTH
+        shown, spare = self._model.shown(state, (0.0, WIDTH)), _BORDER_PX if cut else 0.0
         return [edge for edge in hidden(seen, self._edges) if shown[edge.face] > edge.position_px + spare]
 
     def _contradiction(self, state: Vector, seen: View) -> float:

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robot_formation.alignment.modes import Frames
-from robot_formation.alignment.paper_rules import TARGET, Box, Decision, Verdict
+from robot_formation.alignment.mode import Decision, Frames, Verdict
+from robot_formation.alignment.observation import FaceBox
 from robot_formation.alignment.precise.actuation_model import ActuationModel
 from robot_formation.alignment.precise.marker_edges import EdgeParameters, mean_boxes
 from robot_formation.alignment.precise.marker_projection import (
@@ -24,6 +24,7 @@ from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, 
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.parameters import parameter
+from robot_formation.vision.marker_face import Face
 
 _IMPLAUSIBLE_NIS = 6.0
 """NIS of a look from which on it is taken not to show the whole marker."""
@@ -145,7 +146,7 @@ class PreciseAlignment:
         self._search.found()
         first = not self._filter.known
         self._filter.look(boxes)
-        if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
+        if first and set(boxes) == {Face.TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             self._viewpoints = []
         return self._correct()
@@ -205,11 +206,11 @@ class PreciseAlignment:
         share = _DEADBAND if self._timestep > 0 else _FIRST_DEADBAND * p.first_share
         return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
 
-    def _boxes(self, frames: Frames) -> dict[int, Box]:
+    def _boxes(self, frames: Frames) -> dict[Face, FaceBox]:
         last = frames[-self._p.averaged_frames :]
         return mean_boxes([self._filter.plausible(blocks) for blocks in last])
 
-    def _strange(self, boxes: dict[int, Box]) -> bool:
+    def _strange(self, boxes: dict[Face, FaceBox]) -> bool:
         """Whether a look shows no whole marker, or one where none is expected."""
         return not self._filter.whole(boxes) or (self._filter.known and self._filter.nis(boxes) >= _IMPLAUSIBLE_NIS)
 

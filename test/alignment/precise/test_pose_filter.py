@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alignment_helpers import BOWL_CURVATURE_PER_M, EDGES, MODEL, blocks_of, state_of
-from robot_formation.alignment.paper_rules import FRONT, TARGET, bounding_boxes
+from robot_formation.alignment.observation import bounding_boxes
 from robot_formation.alignment.precise.actuation_model import ActuationModel
 from robot_formation.alignment.precise.marker_edges import mean_boxes, one_marker
 from robot_formation.alignment.precise.marker_projection import (
@@ -25,6 +25,7 @@ from robot_formation.alignment.precise.marker_projection import (
 from robot_formation.alignment.precise.motion_planner import FORMATION, MotionPlanner, PlannerParameters, count_legs
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 LOOKS_FROM = (0.135, -0.135, 0.12, -0.12)
@@ -99,35 +100,35 @@ def test_the_covariance_stays_symmetric_and_positive():
 def test_a_whole_marker_is_told_from_a_half_covered_face(x_m, y_m, yaw_rad, share, left):
     boxes = bounding_boxes(blocks_of(state_of(x_m, y_m, yaw_rad)))
     assert new_filter().whole(boxes)
-    if set(boxes) == {TARGET}:
-        box = boxes[TARGET]
+    if set(boxes) == {Face.TARGET}:
+        box = boxes[Face.TARGET]
         edge = box.left + share * box.width
         rest = replace(box, left=edge) if left else replace(box, right=edge)
-        assert not new_filter().whole({TARGET: rest})
+        assert not new_filter().whole({Face.TARGET: rest})
 
 
 def test_a_block_far_from_where_its_face_should_be_is_left_out():
     found = new_filter()
     look(found, state_of())
     (target,) = blocks_of(state_of())
-    stranger = Block(TARGET, 290, 190, 30, 30, index=9)
+    stranger = Block(Face.TARGET, 290, 190, 30, 30, index=9)
     assert found.plausible([stranger, target]) == [target]
 
 
 def test_one_marker_keeps_the_pieces_of_a_split_face():
-    upper, lower = Block(TARGET, 158, 40, 48, 20, index=0), Block(TARGET, 158, 66, 48, 24, index=1)
-    far = Block(TARGET, 40, 150, 30, 30, index=2)
-    other = Block(FRONT, 200, 50, 20, 48, index=3)
+    upper, lower = Block(Face.TARGET, 158, 40, 48, 20, index=0), Block(Face.TARGET, 158, 66, 48, 24, index=1)
+    far = Block(Face.TARGET, 40, 150, 30, 30, index=2)
+    other = Block(Face.FRONT, 200, 50, 20, 48, index=3)
     kept = one_marker([far, lower, other, upper], lambda block: -block.width * block.height)
     assert {block.index for block in kept} == {0, 1, 3}
 
 
 def test_a_look_averages_the_frames_that_show_the_same_faces_as_the_last():
-    target, front = Block(TARGET, 100, 50, 40, 40, index=0), Block(FRONT, 130, 50, 20, 40, index=1)
-    shifted = Block(TARGET, 104, 50, 40, 40, index=0)
+    target, front = Block(Face.TARGET, 100, 50, 40, 40, index=0), Block(Face.FRONT, 130, 50, 20, 40, index=1)
+    shifted = Block(Face.TARGET, 104, 50, 40, 40, index=0)
     boxes = mean_boxes([[target, front], [target], [shifted]])
-    assert set(boxes) == {TARGET}
-    assert boxes[TARGET].x == pytest.approx(102.0)
+    assert set(boxes) == {Face.TARGET}
+    assert boxes[Face.TARGET].x == pytest.approx(102.0)
 
 
 @settings(max_examples=30, deadline=None)
