@@ -2,7 +2,7 @@
 
 from robot_formation.world.camera import Camera, Picture
 from robot_formation.world.checks import WorldError
-from robot_formation.world.events import JOINT_NAMES, BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
+from robot_formation.world.events import BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.marker_picture import marker_picture
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose, pose_on_surface
@@ -12,7 +12,6 @@ from robot_formation.world.state import WorldState
 from robot_formation.world.world import World
 
 __all__ = [
-    "JOINT_NAMES",
     "BodyState",
     "Camera",
     "Development",

@@ -8,7 +8,8 @@ import pytest
 from component_helpers import wired
 from robot_formation import conversions
 from robot_formation.components.world import surface_mesh
-from robot_formation.drive.movement_system import WHEELS, WheelCommand
+from robot_formation.drive.movement_system import WheelCommand
+from robot_formation.names import WHEELS
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import make_surface, surface_from_texts
 

@@ -10,7 +10,8 @@ from rclpy.node import Node
 
 from repository import ROOT
 from robot_formation import conversions, names
-from robot_formation.drive.movement_system import JOINTS, DriveParameters
+from robot_formation.drive.movement_system import DriveParameters
+from robot_formation.names import JOINTS
 from robot_formation.nodes.host.component_node import qos_profile
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("real_robots")]
