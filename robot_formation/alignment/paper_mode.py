@@ -9,23 +9,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robot_formation.alignment.mode import Decision, Frames, Verdict
 from robot_formation.alignment.observation import FaceBox, bounding_boxes
-from robot_formation.geometry.se2 import Motion
-from robot_formation.parameters import parameter
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.parameters import ParameterError, parameter
 from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 
 @dataclass(frozen=True)
 class AlignmentParameters:
-    """Camera calibration, tolerances and steps of the paper's fine-tuning."""
+    """Camera calibration, tolerances and steps of the paper's fine-tuning.
+
+    Cameras are calibrated at the default formation distance, `geometry.se2.FORMATION_DISTANCE_M`.
+    """
 
     target_x_px: float = parameter(158.5, "Column of the Target block in formation", unit="px", low=0.0, high=315.0)
     slope_px_per_m: float = parameter(
-        836.0, "Pan curve: columns per metre along v at the formation distance", unit="px/m", low=1.0, high=1e5
+        836.0, "Pan curve: columns per metre along v in a formation of 32 cm", unit="px/m", low=1.0, high=1e5
     )
     side_px_m: float = parameter(
         16.64,
@@ -38,7 +41,11 @@ class AlignmentParameters:
         2.65, "What the detector reports less than the true side length", unit="px", low=-20.0, high=20.0
     )
     distance_m: float = parameter(
-        0.328, "Distance from lens to Target face in formation", unit="m", low=0.01, high=10.0
+        0.328,
+        "Distance from lens to Target face in a formation of 32 cm, at which cameras are calibrated",
+        unit="m",
+        low=0.01,
+        high=10.0,
     )
     v_tolerance_px: float = parameter(5.0, "Tolerance of the column (paper: 5 px)", unit="px", low=0.0, high=100.0)
     u_tolerance_m: float = parameter(0.015, "Tolerance along u (paper: 1.5 cm)", unit="m", low=0.0, high=1.0)
@@ -58,6 +65,21 @@ class AlignmentParameters:
         14, "Corrections per timestep after which the follower goes on unaligned", low=1, high=1000
     )
     max_empty_looks: int = parameter(3, "Looks without a block after which the leader is lost", low=1, high=1000)
+
+    def at_distance(self, formation_distance_m: float) -> AlignmentParameters:
+        """Return the parameters for another formation distance [m], by pinhole projection from the calibrated one.
+
+        Raises:
+            ParameterError: if the lens would be on the neighbour's Target face, or behind it.
+        """
+        distance_m = self.distance_m + (formation_distance_m - FORMATION_DISTANCE_M)
+        if distance_m <= 0.0:
+            raise ParameterError(
+                f"fine_tuner: 'formation_distance_m' of {formation_distance_m} leaves no distance between lens and "
+                f"Target face; it must be more than {FORMATION_DISTANCE_M - self.distance_m:.3f}"
+            )
+        slope_px_per_m = self.slope_px_per_m * (self.distance_m / distance_m)
+        return replace(self, distance_m=distance_m, slope_px_per_m=slope_px_per_m)
 
 
 class PaperAlignment:

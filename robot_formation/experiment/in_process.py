@@ -143,7 +143,8 @@ def run_in_process(
     """
     began = time.monotonic()
     timesteps = scenario.parameters("leader")["timesteps"]
-    progress = Progress(scenario.setup.followers, timesteps, say, lambda: time.monotonic() - began)
+    distance_m = scenario.parameters("fine_tuner")["formation_distance_m"]
+    progress = Progress(scenario.setup.followers, timesteps, say, lambda: time.monotonic() - began, distance_m)
     run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
     with contextlib.ExitStack() as stack:
         if bag is not None:

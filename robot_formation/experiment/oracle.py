@@ -44,9 +44,8 @@ class IdealRun(InProcessRun):
         world = from_mapping(WorldNodeParameters, scenario.parameters("world"), where="world")
         self._surface = world.make_surface()
         self._face = TargetFace(Camera(self._surface, world), world)
-        self._alignment = from_mapping(
-            FineTunerNodeParameters, scenario.parameters("fine_tuner"), where="fine_tuner"
-        ).alignment
+        tuner = from_mapping(FineTunerNodeParameters, scenario.parameters("fine_tuner"), where="fine_tuner")
+        self._alignment = tuner.alignment.at_distance(tuner.formation_distance_m)
         super().__init__(scenario, listen=listen)
         self._predictors: dict[str, PredictorComponent] = {}
         for hosted in self._hosted:

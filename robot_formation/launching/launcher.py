@@ -132,7 +132,8 @@ class Launcher:
 
         began = time.monotonic()
         setup, timesteps = self.scenario.setup, self.scenario.parameters("leader")["timesteps"]
-        progress = Progress(setup.followers, timesteps, self._tell, lambda: time.monotonic() - began)
+        distance_m = self.scenario.parameters("fine_tuner")["formation_distance_m"]
+        progress = Progress(setup.followers, timesteps, self._tell, lambda: time.monotonic() - began, distance_m)
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:
             self._start(table, folder, environment)

@@ -70,7 +70,11 @@ def processes(
 
 def progress(scenario: Scenario, namespace: str) -> Process:
     """Make the process that prints a launched run's progress; `formation run` follows the run itself."""
-    parameters = {"followers": scenario.setup.followers, "timesteps": scenario.parameters("leader")["timesteps"]}
+    parameters = {
+        "followers": scenario.setup.followers,
+        "timesteps": scenario.parameters("leader")["timesteps"],
+        "formation_distance_m": scenario.parameters("fine_tuner")["formation_distance_m"],
+    }
     return Process(names.PROGRESS, namespace, parameters)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_formation.alignment.precise.marker_projection import Vector, X, Y, after_motion, pose_of
 from robot_formation.geometry.footprint import footprint_gap_m
-from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion, into_frame
+from robot_formation.geometry.se2 import Motion, into_frame
 from robot_formation.parameters import parameter
 
 _LEG_COST_M = 0.02
@@ -143,7 +143,3 @@ def count_legs(motion: Motion) -> int:
 
 def _clip(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
-
-
-FORMATION = Motion(0.0, -FORMATION_DISTANCE_M, 0.0)
-"""The formation position in the neighbour's frame."""

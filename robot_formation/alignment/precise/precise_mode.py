@@ -19,10 +19,10 @@ from robot_formation.alignment.precise.marker_projection import (
     after_motion,
     pose_of,
 )
-from robot_formation.alignment.precise.motion_planner import FORMATION, MotionPlanner, PlannerParameters, count_legs
+from robot_formation.alignment.precise.motion_planner import MotionPlanner, PlannerParameters, count_legs
 from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, SearchParameters
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
-from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.marker_face import Face
 
@@ -30,7 +30,8 @@ _IMPLAUSIBLE_NIS = 6.0
 """NIS of a look from which on it is taken not to show the whole marker."""
 _VIEWPOINTS_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
-_VIEWPOINT_BESIDE_M = 0.312
+_VIEWPOINT_NEARER_M = 0.008
+"""How much nearer to the neighbour than in formation these places lie."""
 _VIEWPOINT_TOLERANCE = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
 _SPARE_MOVES = 2
@@ -90,13 +91,14 @@ class PreciseParameters:
 class PreciseAlignment:
     """Keeps the estimate over the timesteps; one decision a look."""
 
-    def __init__(self, parameters: PreciseParameters, first_step_m: float) -> None:
+    def __init__(self, parameters: PreciseParameters, first_step_m: float, formation_distance_m: float) -> None:
         self._p = parameters
         self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
         self._planner = MotionPlanner(parameters.approach)
         self._actuation = ActuationModel()
         self._search = NeighbourSearch(parameters.search)
         self._step_m = first_step_m
+        self._formation = Motion(y_m=-formation_distance_m)  # position in the neighbour's frame
         self._moves = 0
         self._timestep = 0
         self._last = Motion()
@@ -118,7 +120,7 @@ class PreciseAlignment:
         """Tell the turn [rad] to make with the prediction move."""
         if not self._filter.known:
             return 0.0
-        heading = pose_of(self._filter.best.state).then(FORMATION).yaw_rad
+        heading = pose_of(self._filter.best.state).then(self._formation).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
 
     def moved(self, asked: Motion, motion: Motion) -> None:
@@ -129,7 +131,7 @@ class PreciseAlignment:
 
     def offset(self) -> Motion | None:
         """Estimate the way to the formation position in the follower's frame."""
-        return pose_of(self._filter.best.state).then(FORMATION) if self._filter.known else None
+        return pose_of(self._filter.best.state).then(self._formation) if self._filter.known else None
 
     def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
@@ -158,7 +160,7 @@ class PreciseAlignment:
         if unsure and self._timestep == 0 and self._viewpoints != []:
             motion, reason = self._to_see_more(state)
         if motion == Motion():
-            if self._within(pose_of(state).then(FORMATION)):
+            if self._within(pose_of(state).then(self._formation)):
                 return Decision(Verdict.ALIGNED, reason="inside the tolerances")
             motion, reason = self._to_formation(state)
         if motion == Motion():
@@ -178,7 +180,7 @@ class PreciseAlignment:
             motion = self._outside_deadband(self._planner.next(states, viewpoint), _VIEWPOINT_TOLERANCE)
             if motion == Motion():
                 continue
-            left = self._outside_deadband(pose_of(after_motion(state, motion)).then(FORMATION), self._deadband())
+            left = self._outside_deadband(pose_of(after_motion(state, motion)).then(self._formation), self._deadband())
             needed = count_legs(motion) + self._planner.moves(left) + _SPARE_MOVES
             affordable = self._p.max_moves - self._moves >= min(needed, _ENOUGH_MOVES)
             return (motion, "to see two faces") if affordable else (Motion(), "")
@@ -189,7 +191,7 @@ class PreciseAlignment:
         motion, reason = self._first(state)
         if motion != Motion():
             return motion, reason
-        motion = self._planner.next(self._filter.likely(), FORMATION)
+        motion = self._planner.next(self._filter.likely(), self._formation)
         return self._outside_deadband(motion, self._deadband()), "to the formation position"
 
     def _first(self, state: Vector) -> tuple[Motion, str]:
@@ -215,7 +217,7 @@ class PreciseAlignment:
         return not self._filter.whole(boxes) or (self._filter.known and self._filter.nis(boxes) >= _IMPLAUSIBLE_NIS)
 
     def _placed(self, state: Vector) -> bool:
-        return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m
+        return math.hypot(state[X], state[Y] + self._formation.y_m) < self._p.placed_m
 
     def _within(self, way: Motion) -> bool:
         p = self._p
@@ -245,5 +247,5 @@ class PreciseAlignment:
             behind = pose_of(state).x_m > 0.0
             self._viewpoints = [-place if behind else place for place in _VIEWPOINTS_M]
         while self._viewpoints:
-            yield Motion(self._viewpoints[0], -_VIEWPOINT_BESIDE_M, 0.0)
+            yield Motion(self._viewpoints[0], self._formation.y_m + _VIEWPOINT_NEARER_M, 0.0)
             self._viewpoints.pop(0)

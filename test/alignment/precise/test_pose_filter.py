@@ -22,12 +22,13 @@ from robot_formation.alignment.precise.marker_projection import (
     pose_of,
     relative_tilt,
 )
-from robot_formation.alignment.precise.motion_planner import FORMATION, MotionPlanner, PlannerParameters, count_legs
+from robot_formation.alignment.precise.motion_planner import MotionPlanner, PlannerParameters, count_legs
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
+FORMATION = Motion(y_m=-FORMATION_DISTANCE_M)
 LOOKS_FROM = (0.135, -0.135, 0.12, -0.12)
 
 
