@@ -12,8 +12,18 @@ from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH
 
+# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
 _CUT = 6.0
+"""Factor on the scatter of the rows of a face that the picture cuts off: the hidden part may reach higher."""
 _SPLIT_PX = 12.0
+"""Widest gap between the pieces of a face that flicker has split."""
+_LATE_PX = 0.5
+"""Further bias of the Target block's left edge beside a Front block: the detector begins a row's earlier segments up to
+one cell of 2 px late."""
+_BESIDE_FRONT = 1.6
+"""Factor on that edge's scatter there."""
+_OTHER_ROWS = 1.5
+"""Factor on the scatter of rows that aren't the Target face's: their edges slant."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +210,7 @@ def view(boxes: dict[Face, FaceBox], p: EdgeParameters) -> View:
     target, front, rear = boxes.get(Face.TARGET), boxes.get(Face.FRONT), boxes.get(Face.REAR)
     if target is not None:
         # The detector begins a row's earlier segments one cell late.
-        late, sigma = (0.5, 1.6 * near) if front is not None else (0.0, near)
+        late, sigma = (_LATE_PX, _BESIDE_FRONT * near) if front is not None else (0.0, near)
         edges.append(Edge(Face.TARGET, "left", target.left - p.target_left_px - late, sigma))
         if front is None:
             edges.append(Edge(Face.TARGET, "right", target.right - p.target_right_px, near))
@@ -214,7 +224,7 @@ def view(boxes: dict[Face, FaceBox], p: EdgeParameters) -> View:
         edges.append(Edge(Face.REAR, "left", rear.left - bias, sigma))
     if boxes:
         widest = max(boxes, key=lambda face: boxes[face].width)
-        edges += _rows(widest, boxes[widest], p, 1.0 if widest == Face.TARGET else 1.5)
+        edges += _rows(widest, boxes[widest], p, 1.0 if widest == Face.TARGET else _OTHER_ROWS)
     return View(tuple(edge for edge in edges if _inside(edge)), frozenset(boxes))
 
 
@@ -234,7 +244,6 @@ def sliver(edge: Edge, front_px: float, p: EdgeParameters) -> Edge:
 
 
 def _rows(face: Face, box: FaceBox, p: EdgeParameters, scale: float) -> Iterable[Edge]:
-    # Of a face that the picture cuts off, the hidden part may reach higher.
     cut = box.left < MARGIN_PX or box.right > WIDTH - 1.0 - MARGIN_PX
     sigma = scale * p.row_sigma_px * (_CUT if cut else 1.0)
     return (

@@ -42,7 +42,9 @@ _CORNERS = {
     (Face.REAR, "top"): [1, 7],
     (Face.REAR, "bottom"): [0, 6],
 }
+"""Numbers of the cube's corners in `MarkerModel` that are the ends of each edge."""
 _LEAST_DEPTH_M = 0.03
+"""Depth at which points beside or behind the lens are taken to lie; bodies that touch leave it more than 20 cm."""
 
 
 @dataclass(frozen=True)

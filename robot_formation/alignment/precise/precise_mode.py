@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from robot_formation.alignment.mode import Decision, Frames, Verdict
 from robot_formation.alignment.observation import FaceBox
-from robot_formation.alignment.precise.actuation_model import ActuationModel
+from robot_formation.alignment.precise.actuation_model import ActuationModel, ActuationParameters
 from robot_formation.alignment.precise.marker_edges import EdgeParameters, mean_boxes
 from robot_formation.alignment.precise.marker_projection import (
     GeometryParameters,
@@ -26,10 +26,12 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.marker_face import Face
 
+# All chosen, with bench/alignment.py; docs/alignment.md ("Constants") says how far runs depend on them.
 _IMPLAUSIBLE_NIS = 6.0
 """NIS of a look from which on it is taken not to show the whole marker."""
 _VIEWPOINTS_M = (0.135, -0.135, 0.135, -0.12, 0.12)
-"""Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
+"""Places along v [m] from where a second face is wide enough to be measured well, in the order of visits; the side on
+which the neighbour stands is the positive one."""
 _VIEWPOINT_NEARER_M = 0.008
 """How much nearer to the neighbour than in formation these places lie."""
 _VIEWPOINT_TOLERANCE = Motion(0.02, 0.02, math.radians(6.0))
@@ -40,9 +42,14 @@ _ENOUGH_MOVES = 6
 """As long as so many are left, the way back isn't counted."""
 _DEADBAND, _FIRST_DEADBAND = 0.8, 0.5
 """Share of the tolerance up to which an offset is left alone while the other axis is corrected; in timestep 0."""
+_TURN_DEADBAND = 0.7
+"""The same of the heading's tolerance, in every timestep."""
 _UNKNOWN_HEADING_RAD = 0.08
+"""Standard deviation of the heading from which on it counts as hardly known."""
 _ASIDE_RAD = 0.25
+"""Bearing of the neighbour, from straight aside, from which on a follower that hardly knows its heading turns first."""
 _FIRST_SIDESTEP_SIGMA_M = 0.002
+"""Standard deviation of the neighbour's way aside in its first step, before the follower knows its own slip."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +91,7 @@ class PreciseParameters:
     geometry: GeometryParameters = GeometryParameters()
     edges: EdgeParameters = EdgeParameters()
     filter: FilterParameters = FilterParameters()
+    actuation: ActuationParameters = ActuationParameters()
     approach: PlannerParameters = PlannerParameters()
     search: SearchParameters = SearchParameters()
 
@@ -95,7 +103,7 @@ class PreciseAlignment:
         self._p = parameters
         self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
         self._planner = MotionPlanner(parameters.approach)
-        self._actuation = ActuationModel()
+        self._actuation = ActuationModel(parameters.actuation)
         self._search = NeighbourSearch(parameters.search)
         self._step_m = first_step_m
         self._formation = Motion(y_m=-formation_distance_m)  # position in the neighbour's frame
@@ -206,7 +214,7 @@ class PreciseAlignment:
     def _deadband(self) -> Motion:
         p = self._p
         share = _DEADBAND if self._timestep > 0 else _FIRST_DEADBAND * p.first_share
-        return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
+        return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, _TURN_DEADBAND * p.heading_tolerance_rad)
 
     def _boxes(self, frames: Frames) -> dict[Face, FaceBox]:
         last = frames[-self._p.averaged_frames :]
