@@ -1,4 +1,4 @@
-"""The pose filter against rendered pictures: the world's camera and the real detector make the blocks, not its own model.
+"""The pose filter against rendered pictures: the world's camera and the real detector make the blocks, not its model.
 
 The true poses are those that the pictures were drawn from.
 """
