@@ -330,7 +330,7 @@ def bag(rng, folder):
     return reading(rng, whole, folder)
 
 
-DETAILS = ("parameters", "versions", "seed", "timesteps", "formation_distance_m", "dropped", "lost", "outcome")
+DETAILS = ("parameters", "versions", "seed", "timesteps", "dropped", "lost", "outcome")
 
 
 def run_details(rng, folder):

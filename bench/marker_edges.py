@@ -17,9 +17,7 @@ import numpy as np
 
 from alignment_grid import equipment
 from robot_formation import names
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.alignment.precise.marker_edges import (
-    PICTURE_WIDTH_PX,
     Edge,
     EdgeParameters,
     mean_boxes,
@@ -28,14 +26,16 @@ from robot_formation.alignment.precise.marker_edges import (
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
 from robot_formation.batch.pool import run_parallel
 from robot_formation.calibration.alignment_trial import FOLLOWER, Start, poses
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.detector import BlockDetector
+from robot_formation.vision.pixy2.picture import WIDTH
 from robot_formation.world.checks import WorldError
 from robot_formation.world.events import Frame
 from robot_formation.world.world import World
 
 MODEL, EDGES = MarkerModel(GeometryParameters()), EdgeParameters()
-OUTER = {FRONT: "right", REAR: "left"}
-NAMES = {TARGET: "Target", FRONT: "Front", REAR: "Rear"}
+OUTER = {Face.FRONT: "right", Face.REAR: "left"}
+NAMES = {Face.TARGET: "Target", Face.FRONT: "Front", Face.REAR: "Rear"}
 
 
 def near(rng):
@@ -50,14 +50,16 @@ def anywhere(rng):
 
 
 def between(follower, leader):
-    """The leader's state as `relative_pose` has it, from both robots' poses in the world."""
+    """The leader's state as `marker_projection` has it, from both robots' poses in the world."""
     rotation = follower.matrix().T @ leader.matrix()
     place = follower.matrix().T @ (np.array(leader.position) - np.array(follower.position))
     yaw = math.atan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])
     tilt = rotation @ cv2.Rodrigues(np.array((0.0, 0.0, -yaw)))[0]
     roll, pitch = 0.5 * (tilt[2, 1] - tilt[1, 2]), 0.5 * (tilt[0, 2] - tilt[2, 0])
     x, y, _ = cv2.Rodrigues(np.array((-0.5 * roll, -0.5 * pitch, 0.0)))[0] @ place
-    return np.array((x, y, yaw, roll / y, pitch + roll / y * x))
+    # Curvatures are more numbers than tilts; of those that give these tilts, the smallest. The picture is the same.
+    curvatures = np.linalg.lstsq(np.array(((y, y, x), (-x, x, -y))), np.array((roll, pitch)), rcond=None)[0]
+    return np.array((x, y, yaw, *curvatures))
 
 
 def look(made, start, seed):
@@ -96,24 +98,24 @@ def errors(found):
     edges, shown = defaultdict(list), defaultdict(list)
     for state, boxes in found:
         columns, widths = MODEL.pixels(state[None])[0, :, 0], MODEL.widths(state)
-        if TARGET not in boxes or columns.min() < 3.0 or columns.max() > PICTURE_WIDTH_PX - 4.0:
+        if Face.TARGET not in boxes or columns.min() < 3.0 or columns.max() > WIDTH - 4.0:
             continue
-        target = boxes[TARGET]
+        target = boxes[Face.TARGET]
         view = "clear" if EDGES.clear(target) else "rough"
         for face, side in OUTER.items():
             shown[face].append((widths[face], face in boxes))
             if face in boxes:
-                band = EDGES.front_band if face == FRONT else EDGES.rear_band
+                band = EDGES.front_band if face == Face.FRONT else EDGES.rear_band
                 where = f"band {band(boxes[face].width)}" if view == "clear" else "any width"
                 edges[f"{NAMES[face]} {side}, {view}, {where}"].append(_error(state, boxes, face, side))
-        if FRONT in boxes:
-            edges["Front left"].append(_error(state, boxes, FRONT, "left"))
+        if Face.FRONT in boxes:
+            edges["Front left"].append(_error(state, boxes, Face.FRONT, "left"))
             continue
-        edges["Target left, no Front"].append(_error(state, boxes, TARGET, "left"))
-        hidden = min(10, math.floor(max(0.0, widths[FRONT])))
-        edges[f"Target right, Front of {hidden:2d} px not reported"].append(_error(state, boxes, TARGET, "right"))
+        edges["Target left, no Front"].append(_error(state, boxes, Face.TARGET, "left"))
+        hidden = min(10, math.floor(max(0.0, widths[Face.FRONT])))
+        edges[f"Target right, Front of {hidden:2d} px not reported"].append(_error(state, boxes, Face.TARGET, "right"))
         for side in ("top", "bottom"):
-            edges[f"Target {side}, no Front"].append(_error(state, boxes, TARGET, side))
+            edges[f"Target {side}, no Front"].append(_error(state, boxes, Face.TARGET, side))
     return edges, shown
 
 

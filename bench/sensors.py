@@ -25,7 +25,6 @@ import time
 
 import numpy as np
 
-from robot_formation.alignment.paper_rules import TARGET
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.sweep_summary import median_with_interval
 from robot_formation.batch.pool import run_parallel
@@ -38,7 +37,7 @@ from robot_formation.experiment.sweep import CONDITIONS
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
 from robot_formation.vision.aruco_detector import TagDetector
-from robot_formation.vision.aruco_patterns import Face
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
@@ -166,8 +165,8 @@ def view():
             for face, corners in outlines.items():
                 faces[kind, group(corners)] += 1
                 found[kind, group(corners)] += face in boxes
-            if TARGET in boxes and Face.TARGET in outlines and sight(outlines[Face.TARGET]) == "whole":
-                errors[kind].append(edges(boxes[TARGET], outlines[Face.TARGET]))
+            if Face.TARGET in boxes and Face.TARGET in outlines and sight(outlines[Face.TARGET]) == "whole":
+                errors[kind].append(edges(boxes[Face.TARGET], outlines[Face.TARGET]))
         any_face["all"] += some
     print(
         f"\n| seen, of {any_face['all']} views with a face in the picture | faces | colours | tags |\n|---|---|---|---|"
@@ -199,7 +198,7 @@ def light():
         for kind in KINDS:
             eye = Eye(kind, **camera)
             pictures = (eye.picture(0.0, 0.32, 0.0, seed)[0] for seed in range(count))
-            found = sum(any(box.signature == TARGET for box in eye.detector.detect(p)) for p in pictures)
+            found = sum(any(box.signature == Face.TARGET for box in eye.detector.detect(p)) for p in pictures)
             shares.append(percent(found, count))
         print(f"| {name} | " + " | ".join(shares) + " |")
 

@@ -1,4 +1,4 @@
-"""Every topic, frame and quality of service in one place.
+"""Every topic, frame, joint and quality of service in one place.
 
 Names are relative: a robot's nodes run in the robot's namespace, the world and the recorder in the one that the robots'
 lie in, the formation's. The done ticks lie under the parameter `formation_namespace`, by default `formation` there.
@@ -23,6 +23,12 @@ OPTICAL_FRAME = "camera_optical_frame"
 OVERHEAD_FRAME = "overhead_camera_optical_frame"
 
 IMAGE_TYPE = "sensor_msgs/msg/Image"
+
+WHEELS = ("front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel")
+ENCODER_WHEELS = ("encoder_wheel_v", "encoder_wheel_u")
+"""encoder_wheel_v counts up along +x of base_link, encoder_wheel_u along +y."""
+JOINTS = WHEELS + ENCODER_WHEELS
+"""A robot's joints in the order of positions and velocities."""
 
 
 @dataclass(frozen=True)

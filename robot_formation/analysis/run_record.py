@@ -152,9 +152,9 @@ class RunRecord:
 
     @property
     def formation_distance_m(self) -> float:
-        """Distance between neighbours in formation, metres: what the run says, else the paper's."""
+        """Distance between neighbours in formation, metres: the run's fine-tuner's, else the paper's."""
         try:
-            said = float(self.details["formation_distance_m"])
-        except (KeyError, ValueError):
+            said = float(node_parameters(self.details)["fine_tuner"]["formation_distance_m"])
+        except (KeyError, ValueError, TypeError, OverflowError):
             return FORMATION_DISTANCE_M
         return said if math.isfinite(said) else FORMATION_DISTANCE_M

@@ -22,7 +22,7 @@ from robot_formation.follower.fine_tuning import (
     SendMove,
 )
 from robot_formation.geometry.footprint import footprint_gap_m
-from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion, formation_error_uv_m
+from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.surface import Surface
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.detector import BlockDetector
@@ -120,6 +120,7 @@ class AlignmentTrial:
         self._drive = Drive(equipment.drive)
         self._detector = BlockDetector(equipment.detector.load(), equipment.detector)
         self._tuner = FineTuner(equipment.fine_tuner)
+        self._distance_m = equipment.fine_tuner.formation_distance_m
         self._tamper = tamper
         self._spoil = spoil
         self._frames = 0
@@ -206,7 +207,7 @@ class AlignmentTrial:
         leader = self._world.ground_truth(names.LEADER).pose
         follower = self._world.ground_truth(FOLLOWER).pose
         yaw = math.remainder(follower.yaw_rad - leader.yaw_rad, math.tau)
-        self.trial.errors = (*formation_error_uv_m(follower.planar, leader.planar, FORMATION_DISTANCE_M), yaw)
+        self.trial.errors = (*formation_error_uv_m(follower.planar, leader.planar, self._distance_m), yaw)
 
 
 def gap_m(a: Pose, b: Pose, length_m: float, width_m: float) -> float:

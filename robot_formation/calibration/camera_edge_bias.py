@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET, Box, bounding_boxes
+from robot_formation.alignment.observation import MARGIN_PX, FaceBox, bounding_boxes
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.calibration.camera_samples import CameraSample
+from robot_formation.vision.marker_face import Face
+from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH
 
 Corners = NDArray[np.float64]
 """Columns and rows (4, 2) of a face's corners, px: left top, left bottom, right top, right bottom as seen from outside;
 the left ones lie on the right if the face is turned away."""
 
-_MARGIN_PX = 5.0
-_SIZE_PX = (316.0, 208.0)
 _LEVEL_PX = 1.0
 """Slant of an edge up to which its row is one."""
 _BANDS = EdgeParameters()
@@ -34,11 +34,11 @@ class EdgeBias:
     scatter_px: float
 
 
-def edge_biases(looks: Iterable[tuple[CameraSample, Mapping[int, Corners]]]) -> dict[str, EdgeBias]:
+def edge_biases(looks: Iterable[tuple[CameraSample, Mapping[Face, Corners]]]) -> dict[str, EdgeBias]:
     """Compare reported with true edges, by the names of `EdgeParameters`.
 
     Args:
-        looks: each with the true corners of the marker's faces, by signature; without faces behind the camera.
+        looks: each with the true corners of the marker's faces; without faces behind the camera.
 
     Returns:
         What was seen often enough to have a scatter.
@@ -54,25 +54,25 @@ def edge_biases(looks: Iterable[tuple[CameraSample, Mapping[int, Corners]]]) -> 
     }
 
 
-def _errors(boxes: Mapping[int, Box], faces: Mapping[int, Corners]) -> Iterator[tuple[str, float]]:
-    target, front, rear = boxes.get(TARGET), boxes.get(FRONT), boxes.get(REAR)
-    if target is not None and _whole(faces.get(TARGET)):
-        left, right, top, bottom = _edges(faces[TARGET])
+def _errors(boxes: Mapping[Face, FaceBox], faces: Mapping[Face, Corners]) -> Iterator[tuple[str, float]]:
+    target, front, rear = boxes.get(Face.TARGET), boxes.get(Face.FRONT), boxes.get(Face.REAR)
+    if target is not None and _whole(faces.get(Face.TARGET)):
+        left, right, top, bottom = _edges(faces[Face.TARGET])
         if front is None:
             yield "target_left_px", target.left - left
-            if _turned_away(faces.get(FRONT)):
+            if _turned_away(faces.get(Face.FRONT)):
                 yield "target_right_px", target.right - right
         if top is not None and bottom is not None:
             yield "target_top_px", target.top - top
             yield "target_bottom_px", target.bottom - bottom
-    if target is not None and front is not None and _whole(faces.get(FRONT)):
-        left, right, _, _ = _edges(faces[FRONT])
+    if target is not None and front is not None and _whole(faces.get(Face.FRONT)):
+        left, right, _, _ = _edges(faces[Face.FRONT])
         yield "front_left_px", front.left - left
         band = f"front_right_px[{_BANDS.front_band(front.width)}]"
         yield band if _BANDS.clear(target) else "rough_front_right_px", front.right - right
-    if target is not None and rear is not None and _whole(faces.get(REAR)):
+    if target is not None and rear is not None and _whole(faces.get(Face.REAR)):
         band = f"rear_left_px[{_BANDS.rear_band(rear.width)}]"
-        yield band if _BANDS.clear(target) else "rough_rear_left_px", rear.left - _edges(faces[REAR])[0]
+        yield band if _BANDS.clear(target) else "rough_rear_left_px", rear.left - _edges(faces[Face.REAR])[0]
 
 
 def _edges(corners: Corners) -> tuple[float, float, float | None, float | None]:
@@ -92,4 +92,4 @@ def _whole(corners: Corners | None) -> bool:
     """Whether a face is turned towards the camera and wholly in the picture."""
     if corners is None or _turned_away(corners):
         return False
-    return bool(np.all(corners > _MARGIN_PX) and np.all(corners < np.array(_SIZE_PX) - 1.0 - _MARGIN_PX))
+    return bool(np.all(corners > MARGIN_PX) and np.all(corners < np.array((WIDTH, HEIGHT)) - 1.0 - MARGIN_PX))

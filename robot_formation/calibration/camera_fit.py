@@ -21,10 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from robot_formation.alignment.paper_rules import TARGET, Box, bounding_boxes
+from robot_formation.alignment.observation import MARGIN_PX, FaceBox, bounding_boxes
 from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+from robot_formation.vision.marker_face import Face
+from robot_formation.vision.pixy2.picture import WIDTH
 
 Floats = NDArray[np.float64]
 
@@ -38,9 +40,6 @@ COMPARED_M = (0.3, 0.4)
 three of its grid about the formation distance give its 7 px."""
 NAMES = ("target_x_px", "slope_px_per_m", "distance_m", "lead_m", "side_bias_px")
 _SAME_M = 1e-9
-_WIDTH_PX = 316.0
-_MARGIN_PX = 5.0
-"""A face nearer to the picture's border than this may be cut off by it."""
 _CONVERGED = 1e-12
 
 
@@ -57,7 +56,7 @@ class FaceView:
 
     u_m: float
     v_m: float
-    box: Box
+    box: FaceBox
     alone: bool
 
 
@@ -127,10 +126,10 @@ def face_views(samples: Iterable[CameraSample]) -> list[FaceView]:
     views = []
     for sample in samples:
         boxes = bounding_boxes(sample.blocks)
-        box = boxes.get(TARGET)
+        box = boxes.get(Face.TARGET)
         if sample.clockwise_deg != 0.0 or box is None:
             continue
-        if box.left > _MARGIN_PX and box.right < _WIDTH_PX - 1.0 - _MARGIN_PX:
+        if box.left > MARGIN_PX and box.right < WIDTH - 1.0 - MARGIN_PX:
             views.append(FaceView(sample.u_m, sample.v_m, box, len(boxes) == 1))
     return sorted(views, key=lambda view: (view.u_m, view.v_m))
 

@@ -14,13 +14,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.calibration.alignment_trial import FOLLOWER, Start, gap_m, poses
 from robot_formation.calibration.camera_edge_bias import Corners
 from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters, WorldNodeParameters
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.follower.fine_tuning import LookParameters
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.picture import scaled
@@ -39,7 +39,7 @@ _DIGITS = 6
 
 
 # Left and right edge of each face as seen from outside: forward and to the left of the marker's middle, in half edges.
-_FACE_SIDES = {TARGET: ((-1, -1), (1, -1)), FRONT: ((1, -1), (1, 1)), REAR: ((-1, 1), (-1, -1))}
+_FACE_SIDES = {Face.TARGET: ((-1, -1), (1, -1)), Face.FRONT: ((1, -1), (1, 1)), Face.REAR: ((-1, 1), (-1, -1))}
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def stand(world: WorldNodeParameters, u_m: float, v_m: float, clockwise_deg: flo
     return _bench(world, None).stand(u_m, v_m, clockwise_deg)
 
 
-def true_faces(world: WorldNodeParameters, sample: CameraSample) -> dict[int, Corners]:
+def true_faces(world: WorldNodeParameters, sample: CameraSample) -> dict[Face, Corners]:
     """Project the corners of the neighbour's marker faces, by signature, as `edge_biases` takes them.
 
     Faces that reach behind the lens are left out.
@@ -129,16 +129,16 @@ class _Bench:
         leader, follower = poses(self._surface, Start(u_m, v_m, clockwise_deg))
         return leader.pose(self._surface, self._world), follower.pose(self._surface, self._world)
 
-    def faces(self, sample: CameraSample) -> dict[int, Corners]:
+    def faces(self, sample: CameraSample) -> dict[Face, Corners]:
         leader, follower = self.stand(sample.u_m, sample.v_m, sample.clockwise_deg)
         rotation, lens = self._camera.optical_frame(follower)
         marker = self._world.marker
         half, heights = marker.edge_m / 2.0, (marker.top_m, marker.top_m - marker.edge_m)
         found = {}
-        for signature, sides in _FACE_SIDES.items():
+        for face, sides in _FACE_SIDES.items():
             corners = np.array([leader.place((x * half, y * half, z)) for x, y in sides for z in heights])
             if np.all((corners - lens) @ rotation[2] > self._world.camera.near_m):
-                found[signature] = self._camera.project(follower, corners)
+                found[face] = self._camera.project(follower, corners)
         return found
 
     def look(self, sensor: Sensor, position: Position, angle: float, look: LookParameters) -> CameraSample:

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 
@@ -74,8 +74,8 @@ class Overlay:
 def kinds_of(sample: CameraSample) -> frozenset[Kind]:
     """Tell what a look shows; Front and Rear together, which flicker can make, count as both."""
     seen = {block.signature for block in sample.blocks}
-    found = {kind for kind, signature in ((Kind.FRONT, FRONT), (Kind.REAR, REAR)) if signature in seen}
-    return frozenset(found or ({Kind.TARGET} if TARGET in seen else ()))
+    found = {kind for kind, signature in ((Kind.FRONT, Face.FRONT), (Kind.REAR, Face.REAR)) if signature in seen}
+    return frozenset(found or ({Kind.TARGET} if Face.TARGET in seen else ()))
 
 
 def overlay(samples: Iterable[CameraSample]) -> list[Overlay]:

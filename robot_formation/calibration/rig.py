@@ -13,8 +13,9 @@ from types import TracebackType
 import numpy as np
 
 from robot_formation.drive.curves import CalibrationError
-from robot_formation.drive.movement_system import JOINTS, LEG_SIGNS, Drive
+from robot_formation.drive.movement_system import LEG_SIGNS, Drive
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import JOINTS
 from robot_formation.surface import Surface
 from robot_formation.world.events import JointStates
 from robot_formation.world.imperfections import generator

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation import conversions, names
+from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.components.overhead_view import OverheadView
@@ -215,7 +215,7 @@ class WorldComponent(Component):
                 text = f"{event.robot} has left the plate at ({event.x_m:.2f}, {event.y_m:.2f}) m and is held there"
                 self.warn(text)
                 if self._parameters.leaving_ends_run:
-                    self.finish(3, text)
+                    self.finish(exit_codes.LOST, text)
 
     def _publish_truth(self, event: RobotPose) -> None:
         robot, state = event.robot, event.state

@@ -11,8 +11,9 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import JointState
 
 from robot_formation.conversions.basics import MessageError, header
-from robot_formation.drive.movement_system import JOINTS, WHEELS, WheelCommand
+from robot_formation.drive.movement_system import WheelCommand
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import JOINTS, WHEELS
 
 _LARGEST_WHEEL_ANGLE_RAD = 1e4
 
@@ -65,7 +66,7 @@ def joint_states(
 
 
 def read_joint_states(message: JointState) -> tuple[list[float], list[float]]:
-    """Read positions [rad] and velocities [rad/s] in the order of `drive.JOINTS`."""
+    """Read positions [rad] and velocities [rad/s] in the order of `names.JOINTS`."""
     index = {name: i for i, name in enumerate(message.name)}
     missing = [name for name in JOINTS if name not in index]
     if missing or len(message.position) != len(index) or len(message.velocity) != len(index):

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 
 from robot_formation.conversions.basics import MessageError, header
+from robot_formation.vision.luminance import LUMINANCE_WEIGHTS
 from robot_formation.vision.pixy2.block import Block
 
 # One point per block. x, y, width and height are pixels, angle degrees, index and age counts (Pixy2 getBlocks record).
@@ -55,8 +56,7 @@ def read_grey_image(message: Image) -> NDArray[np.uint8]:
         return _rows(message, 1)[:, :, 0]
     if message.encoding not in ("rgb8", "bgr8"):
         raise MessageError(f"image encoding {message.encoding!r:.40} can't be read; send mono8, rgb8 or bgr8")
-    weights = np.array([0.299, 0.587, 0.114])
-    return np.asarray(np.rint(read_image(message) @ weights), np.uint8)
+    return np.asarray(np.rint(read_image(message) @ LUMINANCE_WEIGHTS), np.uint8)
 
 
 def _rows(message: Image, channels: int) -> NDArray[np.uint8]:

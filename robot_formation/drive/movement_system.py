@@ -14,11 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import JOINTS
 from robot_formation.parameters import parameter
-
-WHEELS = ("front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel")
-ENCODER_WHEELS = ("encoder_wheel_v", "encoder_wheel_u")
-JOINTS = WHEELS + ENCODER_WHEELS
 
 LEG_SIGNS = {"yaw": (-1.0, 1.0, -1.0, 1.0), "x": (1.0, 1.0, 1.0, 1.0), "y": (-1.0, 1.0, 1.0, -1.0)}
 """Rotation of front left, front right, rear left, rear right per unit of a leg: mecanum kinematics, rollers in X."""
@@ -123,8 +120,8 @@ class Drive:
     ) -> DriveAction:
         """Take the six joints' positions [rad] and velocities [rad/s]; all velocities zero means at rest.
 
-        Joints are ordered as `JOINTS`. Non-finite values must have been refused before. `number` is that of the command
-        that the report answers; a robot whose firmware doesn't tell leaves it empty.
+        Joints are ordered as `names.JOINTS`. Non-finite values must have been refused before. `number` is that of the
+        command that the report answers; a robot whose firmware doesn't tell leaves it empty.
         """
         if self._reference is None:
             # Joints count from zero at the start of the world, so the first report needs no earlier one.

@@ -134,8 +134,13 @@ def run_in_process(
         FormationError: if a component refuses its parameters, or the bag's path is taken or can't be written.
     """
     began = time.monotonic()
-    timesteps = scenario.leader.timesteps
-    progress = Progress(scenario.setup.followers, timesteps, say, lambda: time.monotonic() - began)
+    progress = Progress(
+        scenario.setup.followers,
+        scenario.leader.timesteps,
+        say,
+        lambda: time.monotonic() - began,
+        scenario.fine_tuner.formation_distance_m,
+    )
     run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
     with contextlib.ExitStack() as stack:
         if bag is not None:

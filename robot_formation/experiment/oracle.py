@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from robot_formation import conversions, names
-from robot_formation.alignment.paper_rules import AlignmentParameters
+from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
@@ -41,7 +41,8 @@ class IdealRun(InProcessRun):
         world = scenario.world
         self._surface = world.make_surface()
         self._face = TargetFace(Camera(self._surface, world), world)
-        self._alignment = scenario.fine_tuner.alignment
+        tuner = scenario.fine_tuner
+        self._alignment = tuner.alignment.at_distance(tuner.formation_distance_m)
         super().__init__(scenario, listen=listen)
         self._predictors: dict[str, PredictorComponent] = {}
         for hosted in self._hosted:

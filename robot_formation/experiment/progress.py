@@ -73,11 +73,17 @@ class Progress:
     """
 
     def __init__(
-        self, followers: int, timesteps: int, say: Callable[[str], None], elapsed: Callable[[], float]
+        self,
+        followers: int,
+        timesteps: int,
+        say: Callable[[str], None],
+        elapsed: Callable[[], float],
+        formation_distance_m: float = FORMATION_DISTANCE_M,
     ) -> None:
         self._timesteps = timesteps
         self._say = say
         self._elapsed = elapsed
+        self._place = Motion(y_m=-formation_distance_m)  # in formation, in the neighbour's frame
         self._followers = [names.follower(n) for n in range(1, followers + 1)]
         self._heard = {robot: _Heard() for robot in (names.LEADER, *self._followers)}
         self._handlers: dict[str, Callable[[Any], None]] = {}
@@ -161,7 +167,7 @@ class Progress:
 
     def _say_line(self, robot: str, timestep: int, corrections: list[Motion], own: Motion, neighbour: Motion) -> None:
         correction_m = sum(abs(move.x_m) + abs(move.y_m) for move in corrections)
-        place = neighbour.then(Motion(y_m=-FORMATION_DISTANCE_M))
+        place = neighbour.then(self._place)
         error_m = math.hypot(own.x_m - place.x_m, own.y_m - place.y_m)
         who = f"{robot}  " if len(self._followers) > 1 else ""
         self._say(

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from robot_formation.alignment.paper_rules import AlignmentParameters
+from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.drive.curves import CalibrationError, read_sections
 from robot_formation.follower.fine_tuning import FineTunerParameters
 from robot_formation.parameters import ParameterError, from_mapping, suggestion, to_mapping

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from robot_formation.alignment.modes import AlignmentMode, PaperMode
-from robot_formation.alignment.paper_rules import AlignmentParameters, Decision, Verdict
+from robot_formation.alignment.mode import AlignmentMode, Decision, Verdict
+from robot_formation.alignment.paper_mode import AlignmentParameters, PaperMode
 from robot_formation.alignment.precise.precise_mode import PreciseAlignment, PreciseParameters
 from robot_formation.follower.alignment_state import AlignmentState, State
-from robot_formation.geometry.se2 import Motion
-from robot_formation.parameters import Choice, parameter
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.parameters import Choice, ParameterError, parameter
 from robot_formation.vision.pixy2.block import Block
 
 COLLECTION_TIMESTEPS = 3
@@ -57,7 +57,14 @@ class FineTunerParameters:
     first_step_m: float = parameter(
         0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
     )
-    # The bodies are 8 cm apart in formation: a wild forecast must not push the neighbour.
+    formation_distance_m: float = parameter(
+        FORMATION_DISTANCE_M,
+        "Distance beside the neighbour that is kept, between the origins of base_link, along u",
+        unit="m",
+        low=0.05,
+        high=2.0,
+    )
+    # The bodies are 8 cm apart in a formation of 32 cm: a wild forecast must not push the neighbour.
     max_v_m: float = parameter(0.1, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2)
     max_u_m: float = parameter(
         0.05, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
@@ -68,6 +75,17 @@ class FineTunerParameters:
     look: LookParameters = LookParameters()
     alignment: AlignmentParameters = AlignmentParameters()
     precise: PreciseParameters = PreciseParameters()
+
+    def __post_init__(self) -> None:
+        """Check that the mode can keep the formation distance."""
+        if self.mode == "paper":
+            self.alignment.at_distance(self.formation_distance_m)
+        least_m = self.precise.approach.body_width_m + self.precise.approach.clearance_m
+        if self.mode == "precise" and self.formation_distance_m < least_m:
+            raise ParameterError(
+                f"fine_tuner: 'formation_distance_m' of {self.formation_distance_m} leaves less than "
+                f"'precise.approach.clearance_m' between the bodies; it must be at least {least_m:.3f}"
+            )
 
 
 @dataclass(frozen=True)
@@ -303,5 +321,5 @@ class FineTuner:
 
 def _mode(parameters: FineTunerParameters) -> AlignmentMode:
     if parameters.mode is AlignmentModeName.PAPER:
-        return PaperMode(parameters.alignment)
-    return PreciseAlignment(parameters.precise, parameters.first_step_m)
+        return PaperMode(parameters.alignment.at_distance(parameters.formation_distance_m))
+    return PreciseAlignment(parameters.precise, parameters.first_step_m, parameters.formation_distance_m)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 FORMATION_DISTANCE_M = 0.32
-"""Distance between base_link origins in formation, along u (paper, with the axes read as side by side)."""
+"""Distance between base_link origins in formation, along u (paper, with the axes read as side by side): the default of
+the fine-tuner's `formation_distance_m`, and the distance at which cameras are calibrated."""
 
 
 class Legs(NamedTuple):

@@ -122,8 +122,14 @@ class Launcher:
         from robot_formation.nodes.progress.monitor import Monitor  # here, since it needs the environment of the wheels
 
         began = time.monotonic()
-        setup, timesteps = self.scenario.setup, self.scenario.leader.timesteps
-        progress = Progress(setup.followers, timesteps, self._tell, lambda: time.monotonic() - began)
+        scenario = self.scenario
+        progress = Progress(
+            scenario.setup.followers,
+            scenario.leader.timesteps,
+            self._tell,
+            lambda: time.monotonic() - began,
+            scenario.fine_tuner.formation_distance_m,
+        )
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:
             self._start(table, folder, environment)

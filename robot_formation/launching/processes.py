@@ -71,7 +71,11 @@ def processes(
 
 def progress(scenario: Scenario, namespace: str) -> Process:
     """Make the process that prints a launched run's progress; `formation run` follows the run itself."""
-    parameters = {"followers": scenario.setup.followers, "timesteps": scenario.leader.timesteps}
+    parameters = {
+        "followers": scenario.setup.followers,
+        "timesteps": scenario.leader.timesteps,
+        "formation_distance_m": scenario.fine_tuner.formation_distance_m,
+    }
     return Process(names.PROGRESS, namespace, parameters)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
 from typing import Any
 
 import cv2
@@ -10,19 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.errors import FormationError
+from robot_formation.vision.marker_face import Face
 
 MODULES = 7
 """Modules along a tag's dark square: five of data between two of border."""
 QUIET_MODULES = 1
 """Modules of light margin that a face keeps around the dark square, so that a tag's border is seen before any wall."""
-
-
-class Face(IntEnum):
-    """Faces of the marker; the number is the tag's, and that of the face's colour signature."""
-
-    TARGET = 1
-    FRONT = 2
-    REAR = 3
 
 
 class TagError(FormationError):

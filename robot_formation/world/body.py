@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from robot_formation.geometry.orientation import Vector, rotate
 from robot_formation.surface import Surface
@@ -24,6 +25,34 @@ _read_velocity = pybullet.getBaseVelocity
 _apply_force = pybullet.applyExternalForce
 _apply_torque = pybullet.applyExternalTorque
 _WORLD_FRAME = pybullet.WORLD_FRAME
+
+
+class TractionLaw(NamedTuple):
+    """Constants of the contact of a wheel with the ground, as one tuple for the hot loop.
+
+    Attributes:
+        stiffness_n_m: of the contact along the normal.
+        damping_n_s_m: of the contact along the normal.
+        friction: largest share of the load that the roller's axis holds.
+        roller_drag: share of the load by which the roller resists rolling off.
+        bristle_stiffness_n_m: along the roller's axis.
+        bristle_damping_n_s_m: along the roller's axis.
+        relaxation_m: way driven in which the bristle forgets its deflection.
+        contact_radius_m: from a wheel's centre to the ground.
+        twist_softness_n_m: how much less stiff the wheels are against the frame's twist.
+        twist_travel_m: farthest twist.
+    """
+
+    stiffness_n_m: float
+    damping_n_s_m: float
+    friction: float
+    roller_drag: float
+    bristle_stiffness_n_m: float
+    bristle_damping_n_s_m: float
+    relaxation_m: float
+    contact_radius_m: float
+    twist_softness_n_m: float
+    twist_travel_m: float
 
 
 class Body:
@@ -48,17 +77,17 @@ class Body:
         self._mass_offset = (flaws.mass_x_m, flaws.mass_y_m, parameters.chassis.mass_height_m)
         self._weight = parameters.chassis.mass_kg * parameters.gravity_m_s2
         traction = parameters.traction
-        self._law = (
-            traction.normal_stiffness_n_m,
-            traction.normal_damping_n_s_m,
-            traction.friction,
-            traction.roller_drag,
-            traction.bristle_stiffness_n_m,
-            traction.bristle_damping_n_s_m,
-            traction.relaxation_m,
-            parameters.wheels.radius_m,
-            max(0.0, traction.normal_stiffness_n_m - parameters.chassis.twist_stiffness_n_m),
-            parameters.chassis.twist_travel_m,
+        self._law = TractionLaw(
+            stiffness_n_m=traction.normal_stiffness_n_m,
+            damping_n_s_m=traction.normal_damping_n_s_m,
+            friction=traction.friction,
+            roller_drag=traction.roller_drag,
+            bristle_stiffness_n_m=traction.bristle_stiffness_n_m,
+            bristle_damping_n_s_m=traction.bristle_damping_n_s_m,
+            relaxation_m=traction.relaxation_m,
+            contact_radius_m=parameters.wheels.radius_m,
+            twist_softness_n_m=max(0.0, traction.normal_stiffness_n_m - parameters.chassis.twist_stiffness_n_m),
+            twist_travel_m=parameters.chassis.twist_travel_m,
         )
         self.twist = 0.0
         self.wheels = self._make_wheels(flaws.rolling_radius_scale, flaws.motor_gain)
@@ -157,6 +186,7 @@ class Body:
         One long function on purpose: it is the simulation's hot loop, in plain scalars and local names.
         """
         client, body, dt = self._client, self.index, self._dt
+        # All fields of the law in their order: ten reads by name would take twice as long.
         stiffness, damping, grip, drag, sigma0, sigma1, relaxation, contact_radius, soft, travel = self._law
         # The last step's twist: it changes with the distance driven only.
         yielding, twist = soft * max(-travel, min(travel, self.twist)), 0.0

@@ -6,7 +6,7 @@ import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 
-from robot_formation.world.events import JOINT_NAMES
+from robot_formation.names import ENCODER_WHEELS, WHEELS
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.scene import PEDESTAL_M
 
@@ -31,7 +31,7 @@ def robot_description(name: str, parameters: WorldParameters, *, camera: bool) -
     robot = ElementTree.Element("robot", name=name)
     _add_base(robot, parameters)
     wheels = parameters.wheels
-    for i, joint in enumerate(JOINT_NAMES[:4]):
+    for i, joint in enumerate(WHEELS):
         x = (0.5 if i < 2 else -0.5) * wheels.wheelbase_m
         y = (0.5 if i % 2 == 0 else -0.5) * wheels.track_m
         _add_wheel(robot, joint, (x, y, wheels.radius_m), wheels.radius_m, _WHEEL_WIDTH_M, (0.0, 1.0, 0.0))
@@ -42,7 +42,7 @@ def robot_description(name: str, parameters: WorldParameters, *, camera: bool) -
         (encoders.u_wheel_x_m, encoders.u_wheel_y_m, radius),
     )
     # A wheel that rolls along +y turns about -x.
-    for joint, place, axis in zip(JOINT_NAMES[4:], places, ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)), strict=True):
+    for joint, place, axis in zip(ENCODER_WHEELS, places, ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)), strict=True):
         _add_wheel(robot, joint, place, radius, _ENCODER_WHEEL_WIDTH_M, axis)
     _add_marker(robot, parameters)
     if camera:

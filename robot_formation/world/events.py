@@ -11,16 +11,6 @@ from numpy.typing import NDArray
 from robot_formation.geometry.orientation import Vector
 from robot_formation.world.pose import Pose
 
-JOINT_NAMES = (
-    "front_left_wheel",
-    "front_right_wheel",
-    "rear_left_wheel",
-    "rear_right_wheel",
-    "encoder_wheel_v",
-    "encoder_wheel_u",
-)
-"""Joints in the order of positions and velocities; encoder_wheel_v counts up along +x, encoder_wheel_u along +y."""
-
 
 @dataclass(frozen=True)
 class BodyState:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.vision.luminance import LUMINANCE_WEIGHTS
 from robot_formation.world.parameters import CameraParameters
 
 Array = NDArray[np.float64]
@@ -21,8 +22,6 @@ READOUT_S = 416 * LINE_S
 """Time from the reading of a picture's first row to that of its last (rolling shutter)."""
 MAX_GAIN = 16.0
 """Largest analogue gain; our estimate."""
-LUMA = np.array([0.299, 0.587, 0.114])
-"""Weights of red, green and blue in a picture's mean level (Rec. 601)."""
 
 # Responsivity from the data sheet, V/(lx s); f-number from Pixy2's vendor. Our estimates: the lens lets 90 % of the
 # light through, and 1 V is full scale. A Lambertian surface of reflectance 1 under E lux gives E / (4 N^2) on the chip.
@@ -54,7 +53,7 @@ class Exposure(NamedTuple):
 def lamp_colour(parameters: CameraParameters) -> Array:
     """Light of the lamp in red, green and blue, (3,), about 1: its luminance is what the illuminance says."""
     colour = np.array(parameters.light_colour_rgb, float)
-    return np.asarray(colour / (colour @ LUMA))
+    return np.asarray(colour / (colour @ LUMINANCE_WEIGHTS))
 
 
 def exposure_of(product_s: float, parameters: CameraParameters) -> Exposure:
@@ -83,16 +82,18 @@ def auto_exposure(levels: NDArray[np.float32], tint: Array, parameters: CameraPa
     shortest, longest = exposure_of(0.0, parameters), exposure_of(math.inf, parameters)
     signal_per_s = SIGNAL_PER_LUX_S * parameters.illuminance_lux
     tinted = levels * (tint ** (1.0 / parameters.gamma)).astype(np.float32)[:, None]
-    mean = float(LUMA @ tinted.mean(axis=1))
+    mean = float(LUMINANCE_WEIGHTS @ tinted.mean(axis=1))
     if not mean * signal_per_s:
         return longest
     low, high = ((signal_per_s * end.product_s) ** (1.0 / parameters.gamma) for end in (shortest, longest))
     scale = min(max(parameters.camera_brightness / mean, low), high)
     for _ in range(_STEPS):
-        missing = parameters.camera_brightness - float(LUMA @ np.minimum(scale * tinted, 255.0).mean(axis=1))
+        missing = parameters.camera_brightness - float(
+            LUMINANCE_WEIGHTS @ np.minimum(scale * tinted, 255.0).mean(axis=1)
+        )
         if missing <= _ACCURACY or scale >= high:
             break
-        slope = float(LUMA @ (tinted * (tinted < 255.0 / scale)).mean(axis=1))
+        slope = float(LUMINANCE_WEIGHTS @ (tinted * (tinted < 255.0 / scale)).mean(axis=1))
         scale = min(scale + missing / slope, high) if slope else high
     return exposure_of(scale**parameters.gamma / signal_per_s, parameters)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.surface import Surface
+from robot_formation.vision.luminance import LUMINANCE_WEIGHTS
 from robot_formation.world.imperfections import generator
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
@@ -21,7 +22,7 @@ GreyPicture = NDArray[np.uint8]
 SUPERSAMPLING = 4
 SHIFT = 6
 """Fractional bits of drawn coordinates."""
-_LUMINANCE = np.array([0.299, 0.587, 0.114]) / FULL
+_LUMINANCE = LUMINANCE_WEIGHTS / FULL
 _MARGIN_PX = 3
 _BLUR_REACH_PX = 1
 _NEAREST_M = 0.25

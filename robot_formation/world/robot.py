@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 
 from robot_formation.geometry.orientation import quaternion
+from robot_formation.names import JOINTS
 from robot_formation.surface import Surface
 from robot_formation.world.body import Body
-from robot_formation.world.events import JOINT_NAMES, JointStates
+from robot_formation.world.events import JointStates
 from robot_formation.world.imperfections import draw_imperfections, generator
 from robot_formation.world.parameters import DriveMode, WorldParameters
 from robot_formation.world.pose import Pose
@@ -179,5 +180,5 @@ class Robot:
         )
         speeds = tuple(wheel.speed for wheel in self.body.wheels) + tuple(self.body.encoder_speeds)
         return JointStates(
-            self.name, stamp_ns, JOINT_NAMES, positions, (0.0,) * 6 if final else speeds, final, self.timed_out
+            self.name, stamp_ns, JOINTS, positions, (0.0,) * 6 if final else speeds, final, self.timed_out
         )

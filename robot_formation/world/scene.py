@@ -15,7 +15,8 @@ from robot_formation.world.tag_faces import FACES, tag_rectangles
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
-Face = tuple[Array, Colour]
+ShadedPolygon = tuple[Array, Colour]
+"""Corners (n, 3) in the world, metres, and linear light."""
 
 FULL = 65535.0
 """Linear light 1 in the 16-bit drawing."""
@@ -98,7 +99,7 @@ class Scene:
         r, g, b = albedo * (light * FULL)
         return (float(r), float(g), float(b))
 
-    def robot_faces(self, robot: Pose, lens: Array) -> Iterator[Face]:
+    def robot_faces(self, robot: Pose, lens: Array) -> Iterator[ShadedPolygon]:
         """Faces of a robot that are turned to the lens, in the world frame, in drawing order: body, post, marker."""
         rotation = robot.matrix()
         position = np.asarray(robot.position)

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from robot_formation.alignment.paper_rules import TARGET, AlignmentParameters
+from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.parameters import from_mapping, specs
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.signatures import load_signatures, teach_region
@@ -45,7 +46,7 @@ def looks(count):
         rotation, lens = camera.optical_frame(looking)
         sensor = Sensor(WORLD.camera, number, "follower_1")
         picture = sensor.expose(sensor.develop(camera.light(looking, [seen])), 0.0)
-        (block,) = (block for block in detector.detect(picture) if block.signature == TARGET)
+        (block,) = (block for block in detector.detect(picture) if block.signature == Face.TARGET)
         depth = float((corners - lens).mean(axis=0) @ rotation[2])
         yield depth, float(camera.project(looking, corners)[:, 0].mean()), block
 

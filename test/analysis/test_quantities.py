@@ -192,8 +192,23 @@ def test_ground_truth_is_the_last_pose_at_or_before_the_report() -> None:
     assert track.length_m == 6.0
 
 
-def test_another_formation_distance_in_the_runs_own_words_is_used() -> None:
-    assert RunRecord((), (), details={"formation_distance_m": "0.5"}).formation_distance_m == 0.5
+@pytest.mark.parametrize(
+    ("fine_tuner", "distance_m"),
+    [
+        ({"formation_distance_m": 0.5}, 0.5),
+        ({}, 0.32),
+        ({"formation_distance_m": "far"}, 0.32),
+        ({"formation_distance_m": math.nan}, 0.32),
+    ],
+)
+def test_the_formation_distance_is_that_of_the_runs_fine_tuner(
+    fine_tuner: dict[str, object], distance_m: float
+) -> None:
+    details = {"parameters": json.dumps({"fine_tuner": fine_tuner})}
+    assert RunRecord((), (), details=details).formation_distance_m == distance_m
+
+
+def test_a_run_that_says_nothing_has_the_papers_formation_distance() -> None:
     assert RunRecord((), ()).formation_distance_m == 0.32
 
 

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.calibration.camera_edge_bias import edge_biases
 from robot_formation.calibration.camera_fit import (
@@ -24,6 +23,7 @@ from robot_formation.calibration.camera_fit import (
 )
 from robot_formation.calibration.camera_samples import CameraSample, overlay
 from robot_formation.drive.curves import CalibrationError
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 EDGE_M, FOCAL_PX, CENTRE_PX, BIAS_PX = 0.06, 273.7, 157.5, 2.0
@@ -50,7 +50,7 @@ def seen(
     if rounded:  # edges to the detector's cells of 2 px
         left, right = (2 * round((x + sign * side / 2) / 2) for sign in (-1, 1))
         x, side = (left + right) / 2, right - left
-    return CameraSample(u, v, 0.0, True, 22, (block(TARGET, x, 60, side, side - 1),))
+    return CameraSample(u, v, 0.0, True, 22, (block(Face.TARGET, x, 60, side, side - 1),))
 
 
 def field(**camera: Any) -> list[CameraSample]:
@@ -97,11 +97,11 @@ def test_the_window_and_the_difference_in_it_are_those_of_the_projection() -> No
 
 
 def test_only_whole_target_faces_of_a_parallel_follower_are_views() -> None:
-    front = Block(FRONT, 120, 60, 10, 40)
+    front = Block(Face.FRONT, 120, 60, 10, 40)
     good, beside = seen(0.3, 0.0), seen(0.3, 0.05)
     with_front = CameraSample(0.3, 0.05, 0.0, True, 22, (*beside.blocks, front))
     turned = CameraSample(0.3, 0.0, 15.0, True, 22, good.blocks)
-    cut = CameraSample(0.3, 0.1, 0.0, True, 22, (Block(TARGET, 20, 60, 34, 40),))
+    cut = CameraSample(0.3, 0.1, 0.0, True, 22, (Block(Face.TARGET, 20, 60, 34, 40),))
     views = face_views([with_front, turned, cut, CameraSample(0.3, 0.2, 0.0, True, 22), good])
     assert [(view.v_m, view.alone) for view in views] == [(0.0, True), (0.05, False)]
 
@@ -111,14 +111,14 @@ def test_views_that_do_not_determine_the_curves_are_refused() -> None:
         fit_camera([], EDGE_M)
     with pytest.raises(CalibrationError, match="too few"):
         fit_camera(face_views([seen(0.3, v / 100) for v in range(-5, 6)]), EDGE_M)
-    same = Block(TARGET, 150, 60, 40, 40)
+    same = Block(Face.TARGET, 150, 60, 40, 40)
     stuck = [CameraSample(s.u_m, s.v_m, 0.0, True, 22, (same,)) for s in field()]
     with pytest.raises(CalibrationError, match="lie on no"):
         fit_camera(face_views(stuck), EDGE_M)
 
 
 def test_the_face_is_alone_up_to_the_first_place_that_shows_another() -> None:
-    front = Block(FRONT, 120, 60, 10, 40)
+    front = Block(Face.FRONT, 120, 60, 10, 40)
     places = [seen(0.3, v / 100) for v in range(-4, 7)]
     shown = [
         CameraSample(s.u_m, s.v_m, 0.0, True, 22, (*s.blocks, front)) if s.v_m in (0.04, 0.05) else s for s in places
@@ -139,12 +139,12 @@ def test_each_area_is_what_its_views_have_in_common() -> None:
     cases = {
         "unattainable": (None, None, None),
         "nothing": ((), None, ()),
-        "front": ((FRONT,), (FRONT, TARGET), ()),
-        "target": ((TARGET,), (), None),
-        "rear": ((REAR,), None, (REAR, TARGET)),
-        "front or target": ((FRONT, TARGET), (TARGET,), ()),
-        "target or rear": ((), (TARGET,), (TARGET, REAR)),
-        "front or rear": ((FRONT, REAR), (), ()),
+        "front": ((Face.FRONT,), (Face.FRONT, Face.TARGET), ()),
+        "target": ((Face.TARGET,), (), None),
+        "rear": ((Face.REAR,), None, (Face.REAR, Face.TARGET)),
+        "front or target": ((Face.FRONT, Face.TARGET), (Face.TARGET,), ()),
+        "target or rear": ((), (Face.TARGET,), (Face.TARGET, Face.REAR)),
+        "front or rear": ((Face.FRONT, Face.REAR), (), ()),
     }
     samples = [s for n, signatures in enumerate(cases.values()) for s in looks(n, 0.0, *signatures)]
     places = overlay(samples)
@@ -164,7 +164,7 @@ def test_standard_errors_are_those_of_repeated_calibrations() -> None:
     fits = []
     for _ in range(100):
         noisy = [
-            CameraSample(s.u_m, s.v_m, 0.0, True, 22, (block(TARGET, b.x + rng.normal(0, 0.5), 60, side, side),))
+            CameraSample(s.u_m, s.v_m, 0.0, True, 22, (block(Face.TARGET, b.x + rng.normal(0, 0.5), 60, side, side),))
             for s in field()
             for b in s.blocks
             for side in (b.width + rng.normal(0, 0.5),)
@@ -186,12 +186,12 @@ def reported(*blocks: tuple[int, float, float]) -> CameraSample:
 
 
 def test_edge_biases_are_reported_minus_true_where_the_edge_is_what_it_seems() -> None:
-    hidden = {FRONT: face(200.0, 190.0), REAR: face(160.0, 150.0)}  # turned away
-    alone = (reported((TARGET, 152, 198)), {TARGET: face(150.0, 200.0), **hidden})
-    sliver = (reported((TARGET, 152, 206)), {TARGET: face(150.0, 200.0), FRONT: face(200.0, 206.0)})
-    oblique = (reported((TARGET, 152, 198)), {TARGET: face(150.0, 200.0, slant=3.0), **hidden})
-    cut = (reported((TARGET, 2, 30)), {TARGET: face(-10.0, 30.0), **hidden})
-    behind: tuple[CameraSample, dict[int, NDArray[np.float64]]] = (reported((TARGET, 152, 198)), {})
+    hidden = {Face.FRONT: face(200.0, 190.0), Face.REAR: face(160.0, 150.0)}  # turned away
+    alone = (reported((Face.TARGET, 152, 198)), {Face.TARGET: face(150.0, 200.0), **hidden})
+    sliver = (reported((Face.TARGET, 152, 206)), {Face.TARGET: face(150.0, 200.0), Face.FRONT: face(200.0, 206.0)})
+    oblique = (reported((Face.TARGET, 152, 198)), {Face.TARGET: face(150.0, 200.0, slant=3.0), **hidden})
+    cut = (reported((Face.TARGET, 2, 30)), {Face.TARGET: face(-10.0, 30.0), **hidden})
+    behind: tuple[CameraSample, dict[int, NDArray[np.float64]]] = (reported((Face.TARGET, 152, 198)), {})
     found = edge_biases([alone] * 3 + [sliver, oblique, cut, behind])
     assert {name: (bias.views, bias.mean_px, bias.scatter_px) for name, bias in found.items()} == {
         "target_left_px": (5, 2.0, 0.0),
@@ -202,11 +202,13 @@ def test_edge_biases_are_reported_minus_true_where_the_edge_is_what_it_seems() -
 
 
 def test_edges_of_neighbouring_faces_count_beside_the_target_block_only() -> None:
-    faces = {TARGET: face(150.0, 200.0), FRONT: face(200.0, 230.0), REAR: face(120.0, 150.0)}
-    wide = reported((TARGET, 152, 200), (FRONT, 202, 229))
-    narrow = reported((TARGET, 152, 200), (FRONT, 202, 208))
-    rear = reported((TARGET, 152, 200), (REAR, 123, 150))
-    small = CameraSample(0.6, 0.0, 0.0, True, 22, (Block(TARGET, 176, 65, 48, 30), block(REAR, 136.5, 65, 27, 30)))
+    faces = {Face.TARGET: face(150.0, 200.0), Face.FRONT: face(200.0, 230.0), Face.REAR: face(120.0, 150.0)}
+    wide = reported((Face.TARGET, 152, 200), (Face.FRONT, 202, 229))
+    narrow = reported((Face.TARGET, 152, 200), (Face.FRONT, 202, 208))
+    rear = reported((Face.TARGET, 152, 200), (Face.REAR, 123, 150))
+    small = CameraSample(
+        0.6, 0.0, 0.0, True, 22, (Block(Face.TARGET, 176, 65, 48, 30), block(Face.REAR, 136.5, 65, 27, 30))
+    )
     looks = [(look, faces) for look in (wide, narrow, rear, small) for _ in range(3)]
     found = edge_biases([*looks, (reported(), faces)])
     means = {name: bias.mean_px for name, bias in found.items()}

@@ -16,7 +16,7 @@ from _pytest.capture import CaptureResult
 
 from cli_tools import complaint
 from robot_formation import conversions
-from robot_formation.alignment.paper_rules import AlignmentParameters
+from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.bag.reader import read_bag
 from robot_formation.calibration import camera_run, camera_table

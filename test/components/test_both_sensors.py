@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from component_helpers import Wire, wired
 from robot_formation import conversions
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET, bounding_boxes
+from robot_formation.alignment.observation import bounding_boxes
 from robot_formation.components.block_detector import BlockDetectorComponent
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.experiment.in_memory_record import run_in_memory
@@ -21,7 +21,7 @@ from robot_formation.parameters import ParameterError, flatten, from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
 from robot_formation.vision.aruco_detector import BlockSensor
-from robot_formation.vision.aruco_patterns import Face
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.picture import PictureError
@@ -94,13 +94,13 @@ def second_look(wire: Wire, picture: NDArray[np.uint8], first: int = 1) -> list[
 
 def test_in_formation_the_target_face_is_a_block_of_50_px_50_px_above_the_centre(bench: Bench, wire: Wire) -> None:
     (block,) = second_look(wire, bench.picture())
-    assert (block.signature, block.angle) == (TARGET, 0)
+    assert (block.signature, block.angle) == (Face.TARGET, 0)
     assert (block.x, block.y) == pytest.approx((157.5, 53.4), abs=2.0)
     assert (block.width, block.height) == pytest.approx((50, 50), abs=4.0)
 
 
 @needs_tags
-@pytest.mark.parametrize(("yaw", "faces"), [(-0.7, {TARGET, FRONT}), (0.7, {TARGET, REAR})])
+@pytest.mark.parametrize(("yaw", "faces"), [(-0.7, {Face.TARGET, Face.FRONT}), (0.7, {Face.TARGET, Face.REAR})])
 def test_signatures_name_the_same_faces_and_boxes_nearly_agree(
     bench: Bench, wire: Wire, yaw: float, faces: set[int]
 ) -> None:
@@ -115,7 +115,7 @@ def test_signatures_name_the_same_faces_and_boxes_nearly_agree(
 
 
 def test_the_faces_of_the_tags_are_the_signatures_of_the_fine_tuner() -> None:
-    assert (Face.TARGET, Face.FRONT, Face.REAR) == (TARGET, FRONT, REAR)
+    assert (Face.TARGET, Face.FRONT, Face.REAR) == (Face.TARGET, Face.FRONT, Face.REAR)
 
 
 def test_index_stays_and_age_counts_while_a_block_moves(bench: Bench, wire: Wire) -> None:

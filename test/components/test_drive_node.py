@@ -9,8 +9,9 @@ import pytest
 from component_helpers import Wire, wired
 from robot_formation import conversions
 from robot_formation.drive.curves import CalibrationError
-from robot_formation.drive.movement_system import JOINTS, DriveParameters
+from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import JOINTS
 from robot_formation.parameters import ParameterError
 
 R, E = 0.03, 0.019  # radii of drive and encoder wheels

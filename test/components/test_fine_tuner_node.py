@@ -8,12 +8,13 @@ import pytest
 
 from component_helpers import Wire, wired
 from robot_formation import conversions, exit_codes
-from robot_formation.alignment.paper_rules import FRONT, TARGET, AlignmentParameters, PaperAlignment
+from robot_formation.alignment.paper_mode import AlignmentParameters, PaperAlignment
 from robot_formation.geometry.se2 import Motion
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 BASE, CAMERA = "follower_1/base_link", "follower_1/camera_optical_frame"
-IN_PLACE = [Block(TARGET, 158, 60, 49, 49)]
+IN_PLACE = [Block(Face.TARGET, 158, 60, 49, 49)]
 LOOK = {"frames": 1, "stable_frames": 1}
 NEIGHBOUR, OWN = "/formation/leader/done", "/formation/follower_1/done"
 
@@ -76,7 +77,7 @@ def test_timesteps_0_and_1_on_messages(wire: Wire) -> None:
 def test_a_report_without_the_target_face_says_that_the_residual_is_no_estimate() -> None:
     wire = wired("fine_tuner", "follower_1", mode="paper", look=LOOK, alignment={"max_moves": 1})
     begin(wire)
-    front = [Block(FRONT, 158, 60, 40, 40)]
+    front = [Block(Face.FRONT, 158, 60, 40, 40)]
     wire.give("blocks", blocks(front, 30))
     wire.give("moved", planar(Motion(-0.05), 40))
     sent = dict(wire.give("blocks", blocks(front, 50)))

@@ -10,10 +10,11 @@ import pytest
 from component_helpers import Wire, wired
 from robot_formation import conversions
 from robot_formation.components.world import WorldComponent, surface_mesh
-from robot_formation.drive.movement_system import WHEELS, WheelCommand
+from robot_formation.drive.movement_system import WheelCommand
+from robot_formation.names import WHEELS
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import make_surface, surface_from_texts
-from robot_formation.world import World
+from robot_formation.world.world import World
 
 COMMANDS, REQUEST, IMAGE = "follower_1/joint_commands", "follower_1/camera/request", "follower_1/camera/image_raw"
 

@@ -15,10 +15,11 @@ from robot_formation.components.block_detector import BlockDetectorComponent
 from robot_formation.components.drive import DriveComponent
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters, WorldNodeParameters
 from robot_formation.components.world import WorldComponent
-from robot_formation.drive.movement_system import WHEELS, DriveParameters, WheelCommand
+from robot_formation.drive.movement_system import DriveParameters, WheelCommand
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import WHEELS
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.surface import SURFACES
 

@@ -15,8 +15,9 @@ from sensor_msgs.msg import Image, JointState, PointField
 
 from robot_formation import conversions
 from robot_formation.conversions import MessageError
-from robot_formation.drive.movement_system import JOINTS, WHEELS, WheelCommand
+from robot_formation.drive.movement_system import WheelCommand
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import JOINTS, WHEELS
 from robot_formation.vision.pixy2.block import Block
 
 stamps = st.integers(0, 2**31 * 10**9 - 1)

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_formation.drive.movement_system import JOINTS, CalibrationParameters, Drive, DriveAction, DriveParameters
+from robot_formation.drive.movement_system import CalibrationParameters, Drive, DriveAction, DriveParameters
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import JOINTS
 from robot_formation.parameters import from_mapping
 
 P = DriveParameters()

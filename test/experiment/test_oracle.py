@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from robot_formation import conversions
-from robot_formation.alignment.paper_rules import AlignmentParameters
+from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.experiment.in_process import InProcessRun

@@ -5,7 +5,7 @@ import json
 import pytest
 import yaml
 
-from robot_formation.alignment.paper_rules import TARGET, AlignmentParameters, PaperAlignment
+from robot_formation.alignment.paper_mode import AlignmentParameters, PaperAlignment
 from robot_formation.calibration.camera_check import camera_facts, camera_values, check_camera, describe_camera
 from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
@@ -20,6 +20,7 @@ from robot_formation.follower.camera_calibration_file import (
 )
 from robot_formation.follower.fine_tuning import FineTunerParameters
 from robot_formation.launching.processes import run_metadata
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 VALUES = {
@@ -71,7 +72,7 @@ def test_without_a_file_the_parameters_are_the_same_object():
 def test_the_fine_tuner_node_corrects_by_the_files_curves(file):
     component = tuned_component(file)
     component._tuner.neighbour_done(0)  # the node's own way there is messages
-    block = Block(TARGET, 175, 60, 48, 47)
+    block = Block(Face.TARGET, 175, 60, 48, 47)
     actions = []
     for number in range(1, 23):
         actions += component._tuner.frame([block], number)
@@ -90,7 +91,7 @@ def test_a_file_may_hold_some_values_only(tmp_path):
 def test_calibrated_offset_is_zero_where_the_curves_say_formation():
     alignment = PaperAlignment(AlignmentParameters(**VALUES))
     side = VALUES["side_px_m"] / VALUES["distance_m"] - VALUES["side_bias_px"]
-    offset = alignment.offset([Block(TARGET, 135.0, 60, side, side)])
+    offset = alignment.offset([Block(Face.TARGET, 135.0, 60, side, side)])
     assert (offset.x_m, offset.y_m) == pytest.approx((0.0, 0.0))
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from robot_formation.alignment.paper_rules import FRONT, TARGET, PaperAlignment
+from robot_formation.alignment.paper_mode import PaperAlignment
 from robot_formation.follower.alignment_state import AlignmentState, State
 from robot_formation.follower.fine_tuning import (
     Done,
@@ -19,10 +19,11 @@ from robot_formation.follower.fine_tuning import (
 )
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
-IN_PLACE = [Block(TARGET, 158, 60, 49, 49, index=7)]
-TOO_FAR_BACK = [Block(TARGET, 200, 60, 49, 49, index=7)]  # the face is to the right in the picture, that is, ahead
+IN_PLACE = [Block(Face.TARGET, 158, 60, 49, 49, index=7)]
+TOO_FAR_BACK = [Block(Face.TARGET, 200, 60, 49, 49, index=7)]  # the face is to the right in the picture, that is, ahead
 FRAMES = 2
 
 
@@ -191,7 +192,7 @@ def test_unaligned_after_too_many_corrections_is_warned_reported_and_goes_on():
 
 def test_without_the_target_face_the_residual_is_unknown():
     script = Script(alignment={"max_moves": 1})
-    only_front = [Block(FRONT, 158, 60, 40, 40)]
+    only_front = [Block(Face.FRONT, 158, 60, 40, 40)]
     script.tick(0)
     script.look(IN_PLACE)
     script.tick(1)
@@ -299,8 +300,8 @@ def test_extensions_are_bounded_and_then_the_last_frame_decides():
 
 def test_another_tracking_index_is_another_block_but_order_and_place_are_not():
     for second, stable in (
-        ([Block(TARGET, 158, 60, 49, 49, index=8)], False),
-        ([Block(TARGET, 160, 61, 48, 50, index=7)], True),
+        ([Block(Face.TARGET, 158, 60, 49, 49, index=8)], False),
+        ([Block(Face.TARGET, 160, 61, 48, 50, index=7)], True),
     ):
         script = Script()
         script.tick(0)

@@ -15,8 +15,8 @@ from rclpy.node import Node
 from graph_lab import Lab
 from repository import ROOT
 from robot_formation import conversions, names
-from robot_formation.drive.movement_system import JOINTS, DriveParameters
-from robot_formation.names import Topic
+from robot_formation.drive.movement_system import DriveParameters
+from robot_formation.names import JOINTS, Topic
 from robot_formation.nodes.host.component_node import qos_profile
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("real_robots")]

@@ -2,37 +2,42 @@
 
 import numpy as np
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
-from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
+from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, Matrix, Vector
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 MODEL = MarkerModel(GeometryParameters())
 EDGES = EdgeParameters()
 BOWL_CURVATURE_PER_M = 0.2
-_LEAST_WIDTH_PX = {TARGET: 9.0, FRONT: 9.0, REAR: 15.0}
-_CORNERS = {TARGET: [0, 1, 2, 3], FRONT: [2, 3, 4, 5], REAR: [6, 7, 0, 1]}
+_LEAST_WIDTH_PX = {Face.TARGET: 9.0, Face.FRONT: 9.0, Face.REAR: 15.0}
+_CORNERS = {Face.TARGET: [0, 1, 2, 3], Face.FRONT: [2, 3, 4, 5], Face.REAR: [6, 7, 0, 1]}
 
 
-def state_of(x_m=0.0, y_m=FORMATION_DISTANCE_M, yaw_rad=0.0, curvature_per_m=BOWL_CURVATURE_PER_M):
+def state_of(
+    x_m: float = 0.0,
+    y_m: float = FORMATION_DISTANCE_M,
+    yaw_rad: float = 0.0,
+    curvature_per_m: float = BOWL_CURVATURE_PER_M,
+) -> Vector:
     """The neighbour in the follower's frame."""
     return np.array([x_m, y_m, yaw_rad, curvature_per_m, 0.0, 0.0])
 
 
-def blocks_of(state):
+def blocks_of(state: Vector) -> list[Block]:
     """Blocks of the faces that are wide enough to be reported, edges biased as the detector does."""
     pixels, widths = MODEL.pixels(state[None])[0], MODEL.widths(state)
     seen = [face for face, least in _LEAST_WIDTH_PX.items() if widths[face] > least]
     return [_block(face, pixels[_CORNERS[face]], seen, index) for index, face in enumerate(sorted(seen))]
 
 
-def _block(face, corners, seen, index):
+def _block(face: Face, corners: Matrix, seen: list[Face], index: int) -> Block:
     e = EDGES
     biases = {
-        TARGET: (e.target_left_px + (0.5 if FRONT in seen else 0.0), e.target_right_px),
-        FRONT: (e.front_left_px, e.front_right_px[-1]),
-        REAR: (e.rear_left_px[-1], 0.0),
+        Face.TARGET: (e.target_left_px + (0.5 if Face.FRONT in seen else 0.0), e.target_right_px),
+        Face.FRONT: (e.front_left_px, e.front_right_px[-1]),
+        Face.REAR: (e.rear_left_px[-1], 0.0),
     }[face]
     left, right = corners[:, 0].min() + biases[0], corners[:, 0].max() + biases[1]
     top, bottom = corners[:, 1].min() + e.target_top_px, corners[:, 1].max() + e.target_bottom_px

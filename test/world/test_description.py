@@ -7,10 +7,10 @@ import numpy as np
 import pybullet
 import pytest
 
+from robot_formation.names import JOINTS
 from robot_formation.surface import make_surface
 from robot_formation.world.camera import Camera
 from robot_formation.world.description import robot_description
-from robot_formation.world.events import JOINT_NAMES
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import pose_on_surface
 from world_helpers import parameters
@@ -44,7 +44,7 @@ def frames(tree):
 def test_it_is_one_tree_with_the_documented_links():
     tree = tree_of()
     links = [link.get("name") for link in tree.iter("link")]
-    assert sorted(links) == sorted(["base_link", *JOINT_NAMES, "marker", "camera_link", "camera_optical_frame"])
+    assert sorted(links) == sorted(["base_link", *JOINTS, "marker", "camera_link", "camera_optical_frame"])
     assert tree.tag == "robot"
     assert tree.get("name") == "follower_1"
     children = [joint.find("child").get("link") for joint in tree.iter("joint")]
@@ -70,7 +70,7 @@ def test_the_optical_frame_is_the_simulated_cameras(view):
 def test_joints_of_wheels_are_those_of_the_joint_states_and_turn_the_right_way():
     joints = {joint.get("name"): joint for joint in tree_of().iter("joint")}
     radii = {link.get("name"): link.find("visual/geometry/cylinder") for link in tree_of().iter("link")}
-    for name in JOINT_NAMES:
+    for name in JOINTS:
         joint = joints[name]
         assert joint.get("type") == "continuous"
         axis = np.array([float(v) for v in joint.find("axis").get("xyz").split()])

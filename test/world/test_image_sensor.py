@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import make_surface
+from robot_formation.vision.luminance import LUMINANCE_WEIGHTS
 from robot_formation.world.camera import Camera
 from robot_formation.world.events import Frame
-from robot_formation.world.exposure import LUMA, MAX_GAIN, READOUT_S, exposure_of
+from robot_formation.world.exposure import MAX_GAIN, READOUT_S, exposure_of
 from robot_formation.world.pose import pose_on_surface
 from robot_formation.world.scene import FULL
 from robot_formation.world.sensor import Sensor
@@ -37,7 +38,7 @@ def scene(distance=0.32, ahead=0.0, *, near=True):
 
 
 def luma(picture):
-    return float((picture @ LUMA).mean())
+    return float((picture @ LUMINANCE_WEIGHTS).mean())
 
 
 # --- auto exposure ----------------------------------------------------------------------------------------------------
@@ -264,7 +265,7 @@ def test_the_illuminance_alone_says_how_bright_a_lamp_of_any_colour_is(lamp, lux
     light = flat(0.5, (16, 16, 3))
     white, coloured = (
         (sensor(light_colour_rgb=colour, illuminance_lux=lux, **small).develop(light).levels[0, 0] / 255.0) ** 1.5
-        @ LUMA
+        @ LUMINANCE_WEIGHTS
         for colour in ([255, 255, 255], lamp)
     )
     assert coloured == pytest.approx(white, rel=1e-4)

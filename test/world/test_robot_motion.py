@@ -2,7 +2,8 @@ import math
 
 import pytest
 
-from robot_formation.world.events import JOINT_NAMES, JointStates, RobotPose
+from robot_formation.names import JOINTS
+from robot_formation.world.events import JointStates, RobotPose
 from robot_formation.world.start import RobotStart
 from world_helpers import IDEAL, PAIR, SPEEDS, STRAIGHT, displacement, of_kind, run, world
 
@@ -100,7 +101,7 @@ def test_only_the_last_joint_states_of_a_motion_have_no_velocity():
     events = run(a_world)
     states = of_kind(events, JointStates, "leader")
     assert len(states) > 3
-    assert all(state.names == JOINT_NAMES for state in states)
+    assert all(state.names == JOINTS for state in states)
     assert [any(state.velocities) for state in states] == [True] * (len(states) - 1) + [False]
     assert [state.final for state in states] == [False] * (len(states) - 1) + [True]
     assert states[-1].stamp_ns == a_world.stamp_ns

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from robot_formation.surface import make_surface
-from robot_formation.world import Frame, World
+from robot_formation.world.events import Frame
+from robot_formation.world.world import World
 from world_helpers import PAIR, SPEEDS, STRAIGHT, parameters, run, world
 
 

@@ -3,23 +3,50 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robot_formation.geometry.se2 import Motion, into_frame
+from robot_formation.parameters import parameter
 
+# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
 _LEAST_DRIVE_M = 0.02
-_LEAST_LEG_M = 0.0022
+"""A shorter drive ahead teaches nothing of slip and overshoot."""
 _LONGEST_BESIDE_M = 0.02
+"""Nor does one with a longer leg aside: the leg's own error would count as slip."""
 _FORGETTING = 0.85
-_SLIP_SIGMA, _BESIDE_SIGMA_M, _NOISE_M = 0.05, 0.002, 0.0007
+"""Weight of a drive after one more, in the least squares for slip: some seven drives count."""
+_SLIP_SIGMA, _BESIDE_SIGMA_M = 0.05, 0.002
+"""Standard deviations before any drive: of the slip, share of the way; of a leg aside's error in length."""
+_NOISE_M = 0.0007
+"""Standard deviation of a drive's measured way aside; as the default of `filter.move_floor_m`."""
 _OVERSHOOT_GAIN = 0.4
+"""Share of a drive's overshoot in the running mean."""
 _MOST_OVERSHOOT = 0.5
+"""Bound on one drive's overshoot, either way, share of its length: more is no slope but a push or an obstacle."""
 _SHORT_DRIVE_M = 0.06
+"""Up to this length a leg is asked for longer, by what such legs lately fell short; longer ones are asked for as they
+are."""
 _NO_LEG_M = 1e-6
 """Up to here a component is what rounding leaves of a leg that wasn't asked for."""
-_MOST_SHORT_M = 0.006
+MOST_COMPENSATION_M = 0.006
+"""Bound on what is added to a leg; the planner leaves room for it."""
 _SHORT_GAIN = 0.5
+"""Share of a leg's shortfall in the running mean."""
+
+
+@dataclass(frozen=True)
+class ActuationParameters:
+    """What the actuation model knows of the drive beforehand."""
+
+    least_leg_m: float = parameter(
+        0.0022,
+        "Leg aside up to which the drive doesn't turn its wheels: what it coasts, -u[0] / u[1] of drive.calibration",
+        unit="m",
+        low=0.0,
+        high=0.1,
+    )
 
 
 class ActuationModel:
@@ -30,7 +57,8 @@ class ActuationModel:
         drives: how many drives ahead it knows.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, parameters: ActuationParameters) -> None:
+        self._p = parameters
         self.overshoot = 0.0
         self.drives = 0
         self._aside = np.zeros(2)  # slip, and how far legs aside go beside what was asked for [m]
@@ -67,7 +95,7 @@ class ActuationModel:
         self.overshoot += (_OVERSHOOT_GAIN if self.drives else 1.0) * (overshoot - self.overshoot)
         self.drives += 1
         # A leg shorter than the robot's coasting is not driven at all.
-        driven = abs(sent[1]) > _LEAST_LEG_M
+        driven = abs(sent[1]) > self._p.least_leg_m
         regressor = np.array([got[0], 1.0 if driven else 0.0])
         beside = got[1] - (sent[1] if driven else 0.0)
         spread = self._covariance @ regressor
@@ -88,4 +116,4 @@ class ActuationModel:
         if _NO_LEG_M < abs(want) < _SHORT_DRIVE_M:
             known = self._short.get((axis, want > 0.0), 0.0)
             mean = known + _SHORT_GAIN * (missing - known)
-            self._short[axis, want > 0.0] = max(0.0, min(_MOST_SHORT_M, mean))
+            self._short[axis, want > 0.0] = max(0.0, min(MOST_COMPENSATION_M, mean))

@@ -6,15 +6,24 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET, Box, bounding_boxes
+from robot_formation.alignment.observation import MARGIN_PX, FaceBox, bounding_boxes
 from robot_formation.parameters import ParameterError, parameter
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
+from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH
 
-PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX = 316.0, 208.0
+# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
 _CUT = 6.0
+"""Factor on the scatter of the rows of a face that the picture cuts off: the hidden part may reach higher."""
 _SPLIT_PX = 12.0
-_MARGIN_PX = 5.0
-"""An edge nearer to the picture's border may be the border's, not the marker's."""
+"""Widest gap between the pieces of a face that flicker has split."""
+_LATE_PX = 0.5
+"""Further bias of the Target block's left edge beside a Front block: the detector begins a row's earlier segments up to
+one cell of 2 px late."""
+_BESIDE_FRONT = 1.6
+"""Factor on that edge's scatter there."""
+_OTHER_ROWS = 1.5
+"""Factor on the scatter of rows that aren't the Target face's: their edges slant."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +119,7 @@ class EdgeParameters:
                     "have one value more than it"
                 )
 
-    def clear(self, target: Box | None) -> bool:
+    def clear(self, target: FaceBox | None) -> bool:
         """Whether the marker is near and frontal enough for the finer values of its outer edges."""
         if target is None or target.height < self.clear_height_px:
             return False
@@ -124,14 +133,14 @@ class EdgeParameters:
         """Tell which values hold for a Rear block of this reported width."""
         return bisect_right(self.rear_widths_px, width_px)
 
-    def front_right(self, front: Box, target: Box | None) -> tuple[float, float]:
+    def front_right(self, front: FaceBox, target: FaceBox | None) -> tuple[float, float]:
         """Tell bias and scatter of the Front block's right edge, px."""
         if not self.clear(target):
             return self.rough_front_right_px, self.rough_sigma_px
         band = self.front_band(front.width)
         return self.front_right_px[band], self.front_right_sigma_px[band]
 
-    def rear_left(self, rear: Box, target: Box | None) -> tuple[float, float]:
+    def rear_left(self, rear: FaceBox, target: FaceBox | None) -> tuple[float, float]:
         """Tell bias and scatter of the Rear block's left edge, px."""
         if not self.clear(target):
             return self.rough_rear_left_px, self.rough_sigma_px
@@ -141,12 +150,12 @@ class EdgeParameters:
 
 @dataclass(frozen=True)
 class Edge:
-    """One measured edge: face (signature), side, position [px] and its standard deviation [px].
+    """One measured edge: face, side, position [px] and its standard deviation [px].
 
     The side "width" means a face that isn't reported: it can't be wider than this.
     """
 
-    face: int
+    face: Face
     side: str
     position_px: float
     sigma_px: float
@@ -157,7 +166,7 @@ class View:
     """The edges of a look, and which faces were reported."""
 
     edges: tuple[Edge, ...]
-    faces: frozenset[int]
+    faces: frozenset[Face]
 
 
 def one_marker(blocks: Iterable[Block], cost: Callable[[Block], float]) -> list[Block]:
@@ -173,16 +182,16 @@ def one_marker(blocks: Iterable[Block], cost: Callable[[Block], float]) -> list[
     return kept
 
 
-def mean_boxes(frames: Sequence[Sequence[Block]]) -> dict[int, Box]:
+def mean_boxes(frames: Sequence[Sequence[Block]]) -> dict[Face, FaceBox]:
     """Average each face's box over the frames that report the faces which the last frame reports."""
     last = set(bounding_boxes(frames[-1])) if frames else set()
     groups = [boxes for boxes in map(bounding_boxes, frames) if set(boxes) == last]
     return {face: _mean([boxes[face] for boxes in groups]) for face in sorted(last)}
 
 
-def _mean(boxes: Sequence[Box]) -> Box:
+def _mean(boxes: Sequence[FaceBox]) -> FaceBox:
     count = len(boxes)
-    return Box(
+    return FaceBox(
         sum(box.left for box in boxes) / count,
         sum(box.right for box in boxes) / count,
         sum(box.top for box in boxes) / count,
@@ -190,7 +199,7 @@ def _mean(boxes: Sequence[Box]) -> Box:
     )
 
 
-def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
+def view(boxes: dict[Face, FaceBox], p: EdgeParameters) -> View:
     """Take the edges that can be trusted out of a look's boxes.
 
     Where two faces meet, the one on the right tells the common edge: the detector's rows are exact there only. The
@@ -198,30 +207,30 @@ def view(boxes: dict[int, Box], p: EdgeParameters) -> View:
     """
     edges: list[Edge] = []
     near = p.column_sigma_px
-    target, front, rear = boxes.get(TARGET), boxes.get(FRONT), boxes.get(REAR)
+    target, front, rear = boxes.get(Face.TARGET), boxes.get(Face.FRONT), boxes.get(Face.REAR)
     if target is not None:
         # The detector begins a row's earlier segments one cell late.
-        late, sigma = (0.5, 1.6 * near) if front is not None else (0.0, near)
-        edges.append(Edge(TARGET, "left", target.left - p.target_left_px - late, sigma))
+        late, sigma = (_LATE_PX, _BESIDE_FRONT * near) if front is not None else (0.0, near)
+        edges.append(Edge(Face.TARGET, "left", target.left - p.target_left_px - late, sigma))
         if front is None:
-            edges.append(Edge(TARGET, "right", target.right - p.target_right_px, near))
+            edges.append(Edge(Face.TARGET, "right", target.right - p.target_right_px, near))
     if front is not None:
-        edges.append(Edge(FRONT, "left", front.left - p.front_left_px, near))
+        edges.append(Edge(Face.FRONT, "left", front.left - p.front_left_px, near))
         bias, sigma = p.front_right(front, target)
-        edges.append(Edge(FRONT, "right", front.right - bias, sigma))
+        edges.append(Edge(Face.FRONT, "right", front.right - bias, sigma))
     if rear is not None:
         # Its right edge isn't sharp: it may take in a sliver of the Target face.
         bias, sigma = p.rear_left(rear, target)
-        edges.append(Edge(REAR, "left", rear.left - bias, sigma))
+        edges.append(Edge(Face.REAR, "left", rear.left - bias, sigma))
     if boxes:
         widest = max(boxes, key=lambda face: boxes[face].width)
-        edges += _rows(widest, boxes[widest], p, 1.0 if widest == TARGET else 1.5)
+        edges += _rows(widest, boxes[widest], p, 1.0 if widest == Face.TARGET else _OTHER_ROWS)
     return View(tuple(edge for edge in edges if _inside(edge)), frozenset(boxes))
 
 
 def hidden(view: View, p: EdgeParameters) -> Iterable[Edge]:
     """List bounds on the widths of faces that the look does not report."""
-    for face, width in ((FRONT, p.front_shows_px), (REAR, p.rear_shows_px), (TARGET, p.front_shows_px)):
+    for face, width in ((Face.FRONT, p.front_shows_px), (Face.REAR, p.rear_shows_px), (Face.TARGET, p.front_shows_px)):
         if face not in view.faces:
             yield Edge(face, "width", width, p.hidden_sigma_px)
 
@@ -234,9 +243,8 @@ def sliver(edge: Edge, front_px: float, p: EdgeParameters) -> Edge:
     return replace(edge, position_px=edge.position_px - p.sliver_px * share, sigma_px=sigma)
 
 
-def _rows(face: int, box: Box, p: EdgeParameters, scale: float) -> Iterable[Edge]:
-    # Of a face that the picture cuts off, the hidden part may reach higher.
-    cut = box.left < _MARGIN_PX or box.right > PICTURE_WIDTH_PX - 1.0 - _MARGIN_PX
+def _rows(face: Face, box: FaceBox, p: EdgeParameters, scale: float) -> Iterable[Edge]:
+    cut = box.left < MARGIN_PX or box.right > WIDTH - 1.0 - MARGIN_PX
     sigma = scale * p.row_sigma_px * (_CUT if cut else 1.0)
     return (
         Edge(face, "top", box.top - p.target_top_px, sigma),
@@ -245,5 +253,5 @@ def _rows(face: int, box: Box, p: EdgeParameters, scale: float) -> Iterable[Edge
 
 
 def _inside(edge: Edge) -> bool:
-    size = PICTURE_WIDTH_PX if edge.side in ("left", "right") else PICTURE_HEIGHT_PX
-    return _MARGIN_PX < edge.position_px < size - _MARGIN_PX
+    size = WIDTH if edge.side in ("left", "right") else HEIGHT
+    return MARGIN_PX < edge.position_px < size - MARGIN_PX

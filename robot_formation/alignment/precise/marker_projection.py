@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.alignment.precise.marker_edges import Edge
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
+from robot_formation.vision.marker_face import Face
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -29,20 +29,22 @@ robots are tilted towards each other: its mean, half of what it is more along y 
 SIZE = 6
 
 _CORNERS = {
-    (TARGET, "left"): [0, 1],
-    (TARGET, "right"): [2, 3],
-    (FRONT, "left"): [2, 3],
-    (FRONT, "right"): [4, 5],
-    (REAR, "left"): [6, 7],
-    (REAR, "right"): [0, 1],
-    (TARGET, "top"): [1, 3],
-    (TARGET, "bottom"): [0, 2],
-    (FRONT, "top"): [3, 5],
-    (FRONT, "bottom"): [2, 4],
-    (REAR, "top"): [1, 7],
-    (REAR, "bottom"): [0, 6],
+    (Face.TARGET, "left"): [0, 1],
+    (Face.TARGET, "right"): [2, 3],
+    (Face.FRONT, "left"): [2, 3],
+    (Face.FRONT, "right"): [4, 5],
+    (Face.REAR, "left"): [6, 7],
+    (Face.REAR, "right"): [0, 1],
+    (Face.TARGET, "top"): [1, 3],
+    (Face.TARGET, "bottom"): [0, 2],
+    (Face.FRONT, "top"): [3, 5],
+    (Face.FRONT, "bottom"): [2, 4],
+    (Face.REAR, "top"): [1, 7],
+    (Face.REAR, "bottom"): [0, 6],
 }
+"""Numbers of the cube's corners in `MarkerModel` that are the ends of each edge."""
 _LEAST_DEPTH_M = 0.03
+"""Depth at which points beside or behind the lens are taken to lie; bodies that touch leave it more than 20 cm."""
 
 
 @dataclass(frozen=True)
@@ -114,22 +116,22 @@ class MarkerModel:
         width = np.abs(columns[:, 1] - columns[:, 0])
         return np.asarray(end + (other - end) * np.minimum(1.0, self.parameters.row_inset_px / np.maximum(width, 1.0)))
 
-    def widths(self, state: Vector) -> dict[int, float]:
+    def widths(self, state: Vector) -> dict[Face, float]:
         """Tell how wide each face appears, px; negative if it is turned away."""
         return self.shown(state, (-math.inf, math.inf))
 
-    def shown(self, state: Vector, limits_px: tuple[float, float]) -> dict[int, float]:
+    def shown(self, state: Vector, limits_px: tuple[float, float]) -> dict[Face, float]:
         """Tell how much of each face's width lies between two columns, px; negative if it is turned away."""
         columns = np.clip(self.pixels(state[None])[0, :, 0], *limits_px)
         middle = {edge: float(columns[corners].mean()) for edge, corners in _CORNERS.items()}
-        return {face: middle[face, "right"] - middle[face, "left"] for face in (TARGET, FRONT, REAR)}
+        return {face: middle[face, "right"] - middle[face, "left"] for face in Face}
 
-    def place(self, face: int, column_px: float, height_px: float, yaw: float) -> Vector:
+    def place(self, face: Face, column_px: float, height_px: float, yaw: float) -> Vector:
         """Guess the state from a face's column and height and a yaw, without tilt."""
         p = self.parameters
         depth = p.focal_length_px * p.marker_edge_m / max(height_px, 1.0)
         half = p.marker_edge_m / 2.0
-        out = {TARGET: (0.0, -half), FRONT: (half, 0.0), REAR: (-half, 0.0)}[face]
+        out = {Face.TARGET: (0.0, -half), Face.FRONT: (half, 0.0), Face.REAR: (-half, 0.0)}[face]
         cosine, sine = math.cos(yaw), math.sin(yaw)
         x = (column_px - p.centre_x_px) / p.focal_length_px * depth - (cosine * out[0] - sine * out[1])
         y = depth + p.lens_y_m - (sine * out[0] + cosine * out[1])

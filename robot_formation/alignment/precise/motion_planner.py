@@ -12,19 +12,38 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from robot_formation.alignment.precise.actuation_model import MOST_COMPENSATION_M
 from robot_formation.alignment.precise.marker_projection import Vector, X, Y, after_motion, pose_of
 from robot_formation.geometry.footprint import footprint_gap_m
-from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion, into_frame
+from robot_formation.geometry.se2 import Motion, into_frame
 from robot_formation.parameters import parameter
 
+# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
+# Costs count in metres of way still to go.
 _LEG_COST_M = 0.02
+"""Of each leg: a leg costs one of the timestep's moves."""
 _HIDDEN_COST_M = 0.25
+"""Of an end from where the marker isn't well in view; more than the longest leg."""
 _DETOUR_COST_M = 0.3
+"""Of an end from where the direct way doesn't keep clear."""
 _TURN_COST_M_PER_RAD = 0.15
+"""Of what is left to turn; a robot's corners move by 0.22 m per radian."""
 _PATH_POINTS = 5
+"""Points of a leg, its start included, at which the bodies' gap is computed: 5 cm apart on the longest."""
 _AWAY_M = 0.05
+"""Step away from a neighbour that is too close; as the paper's coarse step."""
+_FACE_SHARES, _FACE_STEPS_M = (1.0, 0.6, 0.3), (0.08, 0.04)
+"""Shares of the turn towards the marker, and then steps away from it, of which the first that keeps clear is made."""
+_YAWS_RAD = (-0.35, 0.35)
+"""Turns that candidates try besides that to the goal: 20 degrees."""
+_FORWARDS_M, _LEFTS_M = (0.05, -0.05, 0.15, -0.15), (-0.05, 0.05)
+"""Legs that candidates try besides those to the goal: short and long ones around the neighbour."""
+_NO_LEG = 1e-9
+"""Metres or radians up to which a component is what rounding leaves of a leg that wasn't asked for."""
 _ROUNDING_M = 1e-6
-_COMPENSATION_M = 0.008
+"""Larger than what rounding adds to a leg's length, smaller than any leg that is worth a move."""
+_SPARE_M = MOST_COMPENSATION_M + 0.002
+"""How much shorter than the longest corrections a direct way's legs stay: room for what the actuation model adds."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +70,7 @@ class MotionPlanner:
         """Choose the next motion towards a goal; no motion if there is none that keeps clear.
 
         Args:
-            states: where the neighbour may stand, as in `relative_pose`, the likeliest first; each must be kept clear.
+            states: where the neighbour may stand (6,), the likeliest first; the way keeps clear of all.
             goal: place and heading to get to, in the neighbour's frame.
         """
         state = states[0]
@@ -70,8 +89,8 @@ class MotionPlanner:
     def face(self, states: Sequence[Vector]) -> Motion:
         """Turn towards the neighbour, as far as that keeps clear wherever it may stand; else step away a little."""
         bearing = -math.atan2(states[0][X], states[0][Y])
-        turns = [Motion(yaw_rad=share * _clip(bearing, self._p.max_turn_rad)) for share in (1.0, 0.6, 0.3)]
-        for motion in [*turns, Motion(y_m=-0.08), Motion(y_m=-0.04)]:
+        turns = [Motion(yaw_rad=share * _clip(bearing, self._p.max_turn_rad)) for share in _FACE_SHARES]
+        for motion in [*turns, *(Motion(y_m=-step) for step in _FACE_STEPS_M)]:
             if all(self._clear(state, motion) for state in states):
                 return motion
         return Motion()
@@ -93,17 +112,17 @@ class MotionPlanner:
 
     def _direct(self, way: Motion) -> bool:
         turn, forward, left = way.legs
-        p, spare = self._p, _COMPENSATION_M
+        p, spare = self._p, _SPARE_M
         return abs(forward) <= p.max_v_m - spare and abs(left) <= p.max_u_m - spare and abs(turn) <= p.max_turn_rad
 
     def _candidates(self, way: Motion) -> list[Motion]:
         p = replace(self._p, max_v_m=self._p.max_v_m - _ROUNDING_M, max_u_m=self._p.max_u_m - _ROUNDING_M)
         turn = _clip(way.yaw_rad, p.max_turn_rad)
         found = []
-        for yaw in dict.fromkeys((turn, 0.0, 0.5 * turn, -0.35, 0.35)):
+        for yaw in dict.fromkeys((turn, 0.0, 0.5 * turn, *_YAWS_RAD)):
             forward, left = into_frame(way.x_m, way.y_m, yaw)
-            forwards = dict.fromkeys((_clip(forward, p.max_v_m), 0.0, 0.05, -0.05, 0.15, -0.15))
-            lefts = dict.fromkeys((_clip(left, p.max_u_m), 0.0, -0.05, -p.max_u_m, 0.05))
+            forwards = dict.fromkeys((_clip(forward, p.max_v_m), 0.0, *_FORWARDS_M))
+            lefts = dict.fromkeys((_clip(left, p.max_u_m), 0.0, _LEFTS_M[0], -p.max_u_m, _LEFTS_M[1]))
             for x, y in itertools.product(forwards, lefts):
                 found.append(Motion.from_legs(yaw, x, y))
         return found
@@ -120,7 +139,7 @@ class MotionPlanner:
 
     def _clear(self, state: Vector, motion: Motion) -> bool:
         """Whether a motion keeps the bodies apart, or at least does not bring them nearer."""
-        least = min(self._p.clearance_m, self._gap(state) - 1e-6)
+        least = min(self._p.clearance_m, self._gap(state) - _ROUNDING_M)
         turn, forward, left = motion.legs
         for leg in (Motion(yaw_rad=turn), Motion(x_m=forward), Motion(y_m=left)):
             if leg == Motion():
@@ -138,12 +157,8 @@ class MotionPlanner:
 
 def count_legs(motion: Motion) -> int:
     """Count the axes that a motion uses in the follower's frame after its turn."""
-    return sum(abs(length) > 1e-9 for length in motion.legs)
+    return sum(abs(length) > _NO_LEG for length in motion.legs)
 
 
 def _clip(value: float, limit: float) -> float:
     return max(-limit, min(limit, value))
-
-
-FORMATION = Motion(0.0, -FORMATION_DISTANCE_M, 0.0)
-"""The formation position in the neighbour's frame."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robot_formation.alignment.paper_rules import Decision, Verdict
+from robot_formation.alignment.mode import Decision, Verdict
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET, Box
+from robot_formation.alignment.observation import FaceBox
 from robot_formation.alignment.precise.marker_edges import EdgeParameters, View, one_marker, view
 from robot_formation.alignment.precise.marker_projection import (
     CURVATURE,
@@ -33,15 +33,38 @@ from robot_formation.alignment.precise.marker_projection import (
 from robot_formation.alignment.precise.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
+# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
 _KEPT_COST = 16.0
+"""Hypotheses are kept up to so much more twice the negative log likelihood than the best has: four standard
+deviations."""
 _LIKELY_COST = 9.0
-_GATE_PX = 15.0
+"""The same for those of which a move must keep clear: three standard deviations."""
+_GATE_PX, _GATE_SIGMAS, _GATE_M_PER_RAD = 15.0, 3.0, 0.5
+"""How far outside a hypothesis's picture a block may lie: at least so much, and by so many standard deviations of the
+place, and so many metres per standard deviation [rad] of the heading."""
+_NEAREST_M = 0.1
+"""Least distance for which metres become pixels there."""
 _MOST_INFLATION = 30.0
+"""Bound on the factor by which a high NIS makes the step model's noise larger."""
 _NIS_GAIN = 0.5
+"""Share of the latest look in the running mean of the NIS after steps."""
 _HYPOTHESES = 50
-FACES = (TARGET, FRONT, REAR)
+"""Most hypotheses: more than there are first guesses."""
+_GUESS_STEP_DEG, _WIDEST_GUESS_DEG = 4, 92
+"""Headings of the first guesses: from beyond the right angle at which the Target face vanishes, close enough together
+for the update to converge from the nearest."""
+_GUESS_SIGMA_M, _GUESS_SIGMA_RAD = 0.1, math.radians(3.0)
+"""Standard deviations of a guess: of place, so that the first look decides it, and of heading, somewhat less than the
+guesses' distance."""
+_SAME_RAD = math.radians(1.5)
+"""Hypotheses that come nearer than this in heading are one."""
+_SWING_M_PER_RAD = 0.02
+"""Standard deviation of the place after a measured turn, per radian."""
+_DRIFT_WAY_M = 0.1
+"""Length of the move that `yaw_drift_rad` is given for."""
 
 
 @dataclass(frozen=True)
@@ -175,8 +198,8 @@ class PoseFilter:
         p = self._p
         length = math.hypot(motion.x_m, motion.y_m)
         # The turn comes first: its error swings the way that follows.
-        yaw = (p.turn_sigma * motion.yaw_rad) ** 2 + p.yaw_drift_rad**2 * length / 0.1
-        place = p.move_floor_m**2 + (p.move_sigma * length) ** 2 + (0.02 * motion.yaw_rad) ** 2
+        yaw = (p.turn_sigma * motion.yaw_rad) ** 2 + p.yaw_drift_rad**2 * length / _DRIFT_WAY_M
+        place = p.move_floor_m**2 + (p.move_sigma * length) ** 2 + (_SWING_M_PER_RAD * motion.yaw_rad) ** 2
         noise = np.diag([place, place, yaw, 0.0, 0.0, 0.0])
         for hypothesis in self.hypotheses:
             self._propagate(hypothesis, motion, noise)
@@ -231,7 +254,7 @@ class PoseFilter:
 
     # --- looks ------------------------------------------------------------------------------------------------------
 
-    def look(self, boxes: dict[int, Box]) -> None:
+    def look(self, boxes: dict[Face, FaceBox]) -> None:
         """Take a look's boxes, at least one."""
         if self._stepped and self.hypotheses:
             self._nis += _NIS_GAIN * (self.nis(boxes) - self._nis)
@@ -257,34 +280,35 @@ class PoseFilter:
         return one_marker(kept, lambda block: math.hypot(block.x - expected[0], block.y - expected[1]))
 
     def _expects(self, hypothesis: Hypothesis, block: Block) -> bool:
-        if block.signature not in FACES:
+        if block.signature not in set(Face):
             return False
         corners = self._model.pixels(hypothesis.state[None])[0]
-        spread = 3.0 * math.sqrt(float(np.trace(hypothesis.covariance[:2, :2]))) + 0.5 * math.sqrt(
-            float(hypothesis.covariance[YAW, YAW])
-        )
-        gate = _GATE_PX + self._model.parameters.focal_length_px * spread / max(0.1, float(hypothesis.state[Y]))
+        place_m = math.sqrt(float(np.trace(hypothesis.covariance[:2, :2])))
+        yaw_rad = math.sqrt(float(hypothesis.covariance[YAW, YAW]))
+        spread_m = _GATE_SIGMAS * place_m + _GATE_M_PER_RAD * yaw_rad
+        distance_m = max(_NEAREST_M, float(hypothesis.state[Y]))
+        gate = _GATE_PX + self._model.parameters.focal_length_px * spread_m / distance_m
         low, high = corners.min(axis=0) - gate, corners.max(axis=0) + gate
         return bool(low[0] <= block.x <= high[0] and low[1] <= block.y <= high[1])
 
-    def nis(self, boxes: dict[int, Box]) -> float:
+    def nis(self, boxes: dict[Face, FaceBox]) -> float:
         """Normalised innovation squared (NIS) of a look, per edge; 1 is expected of a consistent filter."""
         return self._looks.nis(self.hypotheses, view(boxes, self._edges))
 
-    def whole(self, boxes: dict[int, Box]) -> bool:
+    def whole(self, boxes: dict[Face, FaceBox]) -> bool:
         """Whether a look's boxes, at least one, fit together for some pose: not those of a partly covered marker."""
         seen = view(boxes, self._edges)
         guesses = sorted(self._guesses(boxes), key=lambda guess: abs(guess.state[YAW]))  # the likeliest first
         return any(self._looks.fits(guess, seen) for guess in guesses)
 
-    def _guesses(self, boxes: dict[int, Box]) -> list[Hypothesis]:
-        face = TARGET if TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
+    def _guesses(self, boxes: dict[Face, FaceBox]) -> list[Hypothesis]:
+        face = Face.TARGET if Face.TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
         box = boxes[face]
         guesses = []
-        for degrees in range(-92, 93, 4):
+        for degrees in range(-_WIDEST_GUESS_DEG, _WIDEST_GUESS_DEG + 1, _GUESS_STEP_DEG):
             guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
             ground = [self._p.curvature_sigma_per_m**2, self._p.saddle_sigma_per_m**2, self._p.skew_sigma_per_m**2]
-            covariance = np.diag([0.1**2, 0.1**2, math.radians(3.0) ** 2, *ground])
+            covariance = np.diag([_GUESS_SIGMA_M**2, _GUESS_SIGMA_M**2, _GUESS_SIGMA_RAD**2, *ground])
             guesses.append(Hypothesis(guess, covariance))
         return guesses
 
@@ -295,7 +319,7 @@ class PoseFilter:
         for hypothesis in sorted(self.hypotheses, key=lambda h: h.cost):
             if hypothesis.cost > self._least() + _KEPT_COST:
                 continue
-            if all(abs(hypothesis.state[YAW] - other.state[YAW]) > math.radians(1.5) for other in kept):
+            if all(abs(hypothesis.state[YAW] - other.state[YAW]) > _SAME_RAD for other in kept):
                 kept.append(hypothesis)
         self.hypotheses = kept[:_HYPOTHESES]
 

@@ -8,21 +8,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_formation.alignment.paper_rules import FRONT, TARGET
-from robot_formation.alignment.precise.marker_edges import PICTURE_WIDTH_PX, Edge, EdgeParameters, View, hidden, sliver
+from robot_formation.alignment.precise.marker_edges import Edge, EdgeParameters, View, hidden, sliver
 from robot_formation.alignment.precise.marker_projection import SIZE, YAW, MarkerModel, Matrix, Vector, X, Y
+from robot_formation.vision.marker_face import Face
+from robot_formation.vision.pixy2.picture import WIDTH
 
-_ITERATIONS = 6
+# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
+_ITERATIONS, _CONVERGED = 6, 1e-5
+"""Most iterations of an update, and the change of the state [m, rad, 1/m] below which it ends."""
+_LARGEST_CHANGE_RAD = 0.3
+"""Bound on an iteration's change of the heading: farther away the linearisation doesn't hold."""
+_DIFFERENCE = 1e-4
+"""Step of the central differences, m, rad or 1/m: an edge moves by about 0.1 px at most."""
 _STRAY_SIGMAS = 1.5
+"""Residual, in standard deviations, from which on an edge pulls with limited force; 1.345 is usual (Huber)."""
 _WORST_RESIDUALS, _OUTLIER_SIGMAS = 9.0, 2.5
 """Squared residuals of a look's edges from which on the marker isn't seen whole; where they begin to grow less."""
+_NIS_SIGMAS = 2.0
+"""For the NIS, an edge's standard deviation counts so many times."""
 _BORDER_PX = 8.0
 """Of a face that the picture cuts off, so much more must show before it is always reported."""
+_LEAST_WIDTH_PX, _WIDTH_SIGMA_PX = 1.0, 2.0
+"""A face that was reported must be so wide; standard deviation of that."""
+_FARTHEST_M, _LARGEST_YAW_RAD = 2.0, 2.0
+"""Bounds on place and heading of a neighbour that could be in view: from there a face is 8 px wide, and the first
+guesses go to 92 degrees."""
 
 
 @dataclass
 class Hypothesis:
-    """State (6,) and covariance (6, 6) as in `relative_pose`, and twice the negative log likelihood of all looks."""
+    """State (6,) and covariance (6, 6) as in `marker_projection`, and -2 log likelihood of all looks."""
 
     state: Vector
     covariance: Matrix
@@ -33,7 +48,7 @@ class Hypothesis:
         """Whether it is about a neighbour that could be in view."""
         x, y, yaw = (float(self.state[index]) for index in (X, Y, YAW))
         finite = math.isfinite(self.cost) and bool(np.isfinite(self.state).all())
-        return finite and math.hypot(x, y) < 2.0 and abs(yaw) < 2.0
+        return finite and math.hypot(x, y) < _FARTHEST_M and abs(yaw) < _LARGEST_YAW_RAD
 
 
 class LookUpdate:
@@ -61,9 +76,9 @@ class LookUpdate:
             scatter = h @ covariance @ h.T + noise
             gain = np.linalg.solve(scatter, h @ covariance).T
             change = prior + gain @ (measured - predicted - h @ (prior - state)) - state
-            change[YAW] = max(-0.3, min(0.3, change[YAW]))
+            change[YAW] = max(-_LARGEST_CHANGE_RAD, min(_LARGEST_CHANGE_RAD, change[YAW]))
             state = state + change
-            if float(np.abs(change).max()) < 1e-5:
+            if float(np.abs(change).max()) < _CONVERGED:
                 break
         h, predicted = self._linearise(state, edges)
         kept = np.eye(SIZE) - gain @ h
@@ -87,7 +102,9 @@ class LookUpdate:
         for hypothesis in hypotheses:
             h, predicted = self._linearise(hypothesis.state, seen.edges)
             innovation = np.array([edge.position_px for edge in seen.edges]) - predicted
-            scatter = h @ hypothesis.covariance @ h.T + np.diag([4.0 * edge.sigma_px**2 for edge in seen.edges])
+            scatter = h @ hypothesis.covariance @ h.T + np.diag(
+                [_NIS_SIGMAS**2 * edge.sigma_px**2 for edge in seen.edges]
+            )
             costs.append(float(innovation @ np.linalg.solve(scatter, innovation)) / len(seen.edges))
         return min(costs)
 
@@ -101,30 +118,30 @@ class LookUpdate:
         return float(np.sum(ratios**2 / strays)) + self._contradiction(state, seen)
 
     def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:
-        steps = 1e-4 * np.eye(SIZE)
+        steps = _DIFFERENCE * np.eye(SIZE)
         found = self._model.edges(np.concatenate([state[None], state + steps, state - steps]), edges)
-        return ((found[1 : SIZE + 1] - found[SIZE + 1 :]) / 2e-4).T, found[0]
+        return ((found[1 : SIZE + 1] - found[SIZE + 1 :]) / (2.0 * _DIFFERENCE)).T, found[0]
 
     def _trusted(self, state: Vector, seen: View) -> list[Edge]:
         """List the edges; a Front face that is not reported may shift the Target block's right one."""
-        if FRONT in seen.faces or (front_px := self._model.widths(state)[FRONT]) <= 0.0:
+        if Face.FRONT in seen.faces or (front_px := self._model.widths(state)[Face.FRONT]) <= 0.0:
             return list(seen.edges)
         return [
-            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (TARGET, "right") else edge
+            sliver(edge, front_px, self._edges) if (edge.face, edge.side) == (Face.TARGET, "right") else edge
             for edge in seen.edges
         ]
 
     def _exceeded(self, state: Vector, seen: View) -> list[Edge]:
         """List the bounds on faces that were not reported which a state breaks."""
         columns = self._model.pixels(state[None])[0, :, 0]
-        cut = columns.min() < 0.0 or columns.max() > PICTURE_WIDTH_PX
-        shown, spare = self._model.shown(state, (0.0, PICTURE_WIDTH_PX)), _BORDER_PX if cut else 0.0
+        cut = columns.min() < 0.0 or columns.max() > WIDTH
+        shown, spare = self._model.shown(state, (0.0, WIDTH)), _BORDER_PX if cut else 0.0
         return [edge for edge in hidden(seen, self._edges) if shown[edge.face] > edge.position_px + spare]
 
     def _contradiction(self, state: Vector, seen: View) -> float:
         """Charge faces that were reported and should not have been, or the other way round."""
         widths = self._model.widths(state)
-        cost = sum(max(0.0, 1.0 - widths[face]) ** 2 / 4.0 for face in seen.faces)
+        cost = sum(max(0.0, _LEAST_WIDTH_PX - widths[face]) ** 2 / _WIDTH_SIGMA_PX**2 for face in seen.faces)
         for edge in self._exceeded(state, seen):
             cost += ((widths[edge.face] - edge.position_px) / edge.sigma_px) ** 2
         return cost

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robot_formation.alignment.modes import Frames
-from robot_formation.alignment.paper_rules import TARGET, Box, Decision, Verdict
-from robot_formation.alignment.precise.actuation_model import ActuationModel
+from robot_formation.alignment.mode import Decision, Frames, Verdict
+from robot_formation.alignment.observation import FaceBox
+from robot_formation.alignment.precise.actuation_model import ActuationModel, ActuationParameters
 from robot_formation.alignment.precise.marker_edges import EdgeParameters, mean_boxes
 from robot_formation.alignment.precise.marker_projection import (
     GeometryParameters,
@@ -19,17 +19,21 @@ from robot_formation.alignment.precise.marker_projection import (
     after_motion,
     pose_of,
 )
-from robot_formation.alignment.precise.motion_planner import FORMATION, MotionPlanner, PlannerParameters, count_legs
+from robot_formation.alignment.precise.motion_planner import MotionPlanner, PlannerParameters, count_legs
 from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, SearchParameters
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
-from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
+from robot_formation.vision.marker_face import Face
 
+# All chosen, with bench/alignment.py; docs/alignment.md ("Constants") says how far runs depend on them.
 _IMPLAUSIBLE_NIS = 6.0
 """NIS of a look from which on it is taken not to show the whole marker."""
 _VIEWPOINTS_M = (0.135, -0.135, 0.135, -0.12, 0.12)
-"""Places along v from where a second face is wide enough to be measured well; the near side is the positive one."""
-_VIEWPOINT_BESIDE_M = 0.312
+"""Places along v [m] from where a second face is wide enough to be measured well, in the order of visits; the side on
+which the neighbour stands is the positive one."""
+_VIEWPOINT_NEARER_M = 0.008
+"""How much nearer to the neighbour than in formation these places lie."""
 _VIEWPOINT_TOLERANCE = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
 _SPARE_MOVES = 2
@@ -38,9 +42,14 @@ _ENOUGH_MOVES = 6
 """As long as so many are left, the way back isn't counted."""
 _DEADBAND, _FIRST_DEADBAND = 0.8, 0.5
 """Share of the tolerance up to which an offset is left alone while the other axis is corrected; in timestep 0."""
+_TURN_DEADBAND = 0.7
+"""The same of the heading's tolerance, in every timestep."""
 _UNKNOWN_HEADING_RAD = 0.08
+"""Standard deviation of the heading from which on it counts as hardly known."""
 _ASIDE_RAD = 0.25
+"""Bearing of the neighbour, from straight aside, from which on a follower that hardly knows its heading turns first."""
 _FIRST_SIDESTEP_SIGMA_M = 0.002
+"""Standard deviation of the neighbour's way aside in its first step, before the follower knows its own slip."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +91,7 @@ class PreciseParameters:
     geometry: GeometryParameters = GeometryParameters()
     edges: EdgeParameters = EdgeParameters()
     filter: FilterParameters = FilterParameters()
+    actuation: ActuationParameters = ActuationParameters()
     approach: PlannerParameters = PlannerParameters()
     search: SearchParameters = SearchParameters()
 
@@ -89,13 +99,14 @@ class PreciseParameters:
 class PreciseAlignment:
     """Keeps the estimate over the timesteps; one decision a look."""
 
-    def __init__(self, parameters: PreciseParameters, first_step_m: float) -> None:
+    def __init__(self, parameters: PreciseParameters, first_step_m: float, formation_distance_m: float) -> None:
         self._p = parameters
         self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
         self._planner = MotionPlanner(parameters.approach)
-        self._actuation = ActuationModel()
+        self._actuation = ActuationModel(parameters.actuation)
         self._search = NeighbourSearch(parameters.search)
         self._step_m = first_step_m
+        self._formation = Motion(y_m=-formation_distance_m)  # position in the neighbour's frame
         self._moves = 0
         self._timestep = 0
         self._last = Motion()
@@ -117,7 +128,7 @@ class PreciseAlignment:
         """Tell the turn [rad] to make with the prediction move."""
         if not self._filter.known:
             return 0.0
-        heading = pose_of(self._filter.best.state).then(FORMATION).yaw_rad
+        heading = pose_of(self._filter.best.state).then(self._formation).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
 
     def moved(self, asked: Motion, motion: Motion) -> None:
@@ -128,7 +139,7 @@ class PreciseAlignment:
 
     def offset(self) -> Motion | None:
         """Estimate the way to the formation position in the follower's frame."""
-        return pose_of(self._filter.best.state).then(FORMATION) if self._filter.known else None
+        return pose_of(self._filter.best.state).then(self._formation) if self._filter.known else None
 
     def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
@@ -145,7 +156,7 @@ class PreciseAlignment:
         self._search.found()
         first = not self._filter.known
         self._filter.look(boxes)
-        if first and set(boxes) == {TARGET} and self._placed(self._filter.best.state):
+        if first and set(boxes) == {Face.TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             self._viewpoints = []
         return self._correct()
@@ -157,7 +168,7 @@ class PreciseAlignment:
         if unsure and self._timestep == 0 and self._viewpoints != []:
             motion, reason = self._to_see_more(state)
         if motion == Motion():
-            if self._within(pose_of(state).then(FORMATION)):
+            if self._within(pose_of(state).then(self._formation)):
                 return Decision(Verdict.ALIGNED, reason="inside the tolerances")
             motion, reason = self._to_formation(state)
         if motion == Motion():
@@ -177,7 +188,7 @@ class PreciseAlignment:
             motion = self._outside_deadband(self._planner.next(states, viewpoint), _VIEWPOINT_TOLERANCE)
             if motion == Motion():
                 continue
-            left = self._outside_deadband(pose_of(after_motion(state, motion)).then(FORMATION), self._deadband())
+            left = self._outside_deadband(pose_of(after_motion(state, motion)).then(self._formation), self._deadband())
             needed = count_legs(motion) + self._planner.moves(left) + _SPARE_MOVES
             affordable = self._p.max_moves - self._moves >= min(needed, _ENOUGH_MOVES)
             return (motion, "to see two faces") if affordable else (Motion(), "")
@@ -188,7 +199,7 @@ class PreciseAlignment:
         motion, reason = self._first(state)
         if motion != Motion():
             return motion, reason
-        motion = self._planner.next(self._filter.likely(), FORMATION)
+        motion = self._planner.next(self._filter.likely(), self._formation)
         return self._outside_deadband(motion, self._deadband()), "to the formation position"
 
     def _first(self, state: Vector) -> tuple[Motion, str]:
@@ -203,18 +214,18 @@ class PreciseAlignment:
     def _deadband(self) -> Motion:
         p = self._p
         share = _DEADBAND if self._timestep > 0 else _FIRST_DEADBAND * p.first_share
-        return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, 0.7 * p.heading_tolerance_rad)
+        return Motion(share * p.v_tolerance_m, share * p.u_tolerance_m, _TURN_DEADBAND * p.heading_tolerance_rad)
 
-    def _boxes(self, frames: Frames) -> dict[int, Box]:
+    def _boxes(self, frames: Frames) -> dict[Face, FaceBox]:
         last = frames[-self._p.averaged_frames :]
         return mean_boxes([self._filter.plausible(blocks) for blocks in last])
 
-    def _strange(self, boxes: dict[int, Box]) -> bool:
+    def _strange(self, boxes: dict[Face, FaceBox]) -> bool:
         """Whether a look shows no whole marker, or one where none is expected."""
         return not self._filter.whole(boxes) or (self._filter.known and self._filter.nis(boxes) >= _IMPLAUSIBLE_NIS)
 
     def _placed(self, state: Vector) -> bool:
-        return math.hypot(state[X], state[Y] - FORMATION_DISTANCE_M) < self._p.placed_m
+        return math.hypot(state[X], state[Y] + self._formation.y_m) < self._p.placed_m
 
     def _within(self, way: Motion) -> bool:
         p = self._p
@@ -244,5 +255,5 @@ class PreciseAlignment:
             behind = pose_of(state).x_m > 0.0
             self._viewpoints = [-place if behind else place for place in _VIEWPOINTS_M]
         while self._viewpoints:
-            yield Motion(self._viewpoints[0], -_VIEWPOINT_BESIDE_M, 0.0)
+            yield Motion(self._viewpoints[0], self._formation.y_m + _VIEWPOINT_NEARER_M, 0.0)
             self._viewpoints.pop(0)

@@ -12,6 +12,7 @@ from rclpy.executors import Executor
 
 from robot_formation import conversions, exit_codes
 from robot_formation.experiment.progress import Progress
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.nodes.host.component_node import qos_profile
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.ros_parameters import ParameterNode, declare
@@ -30,6 +31,13 @@ class ProgressParameters:
 
     followers: int = parameter(1, "Number of followers", low=1, high=9)
     timesteps: int = parameter(15, "Timesteps of the run, for the lines", low=1, high=1_000_000)
+    formation_distance_m: float = parameter(
+        FORMATION_DISTANCE_M,
+        "The fine-tuners' formation distance, for the formation error",
+        unit="m",
+        low=0.05,
+        high=2.0,
+    )
 
 
 class Executable:
@@ -42,7 +50,13 @@ class Executable:
         self._node = node
         self._messages = 0
         began = time.monotonic()
-        self._progress = Progress(parameters.followers, parameters.timesteps, _say, lambda: time.monotonic() - began)
+        self._progress = Progress(
+            parameters.followers,
+            parameters.timesteps,
+            _say,
+            lambda: time.monotonic() - began,
+            parameters.formation_distance_m,
+        )
         for name in self._progress.topics:
             topic = topic_of(name)
             message_class, inside = conversions.message_class(topic.type), name.lstrip("/")

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, relative_tilt
+from robot_formation.vision.marker_face import Face
 
 P = GeometryParameters()
 MATRIX = np.array([[P.focal_length_px, 0.0, P.centre_x_px], [0.0, P.focal_length_px, P.centre_y_px], [0.0, 0.0, 1.0]])
@@ -50,12 +50,14 @@ def test_the_projection_is_that_of_opencv(x_m, y_m, yaw_rad, mean, saddle, skew)
 
 def test_in_formation_the_target_face_has_the_paper_s_size_and_the_other_faces_are_turned_away():
     widths = MarkerModel(P).widths(np.array([0.0, 0.32, 0.0, 0.0, 0.0, 0.0]))
-    assert widths[TARGET] == pytest.approx(P.focal_length_px * P.marker_edge_m / 0.328)
-    assert widths[FRONT] < 0.0
-    assert widths[REAR] < 0.0
+    assert widths[Face.TARGET] == pytest.approx(P.focal_length_px * P.marker_edge_m / 0.328)
+    assert widths[Face.FRONT] < 0.0
+    assert widths[Face.REAR] < 0.0
 
 
-@pytest.mark.parametrize(("turn_deg", "shown", "hidden"), [(40.0, REAR, FRONT), (-40.0, FRONT, REAR)])
+@pytest.mark.parametrize(
+    ("turn_deg", "shown", "hidden"), [(40.0, Face.REAR, Face.FRONT), (-40.0, Face.FRONT, Face.REAR)]
+)
 def test_a_neighbour_that_turns_shows_one_more_face(turn_deg, shown, hidden):
     widths = MarkerModel(P).widths(np.array([0.0, 0.4, math.radians(turn_deg), 0.0, 0.0, 0.0]))
     assert widths[shown] > 5.0

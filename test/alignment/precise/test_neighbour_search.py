@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from robot_formation.alignment.paper_rules import Verdict
+from robot_formation.alignment.mode import Verdict
 from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, SearchParameters
 from robot_formation.geometry.se2 import Motion
 

@@ -6,22 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_formation.alignment.paper_rules import (
-    FRONT,
-    REAR,
-    TARGET,
-    AlignmentParameters,
-    PaperAlignment,
-    Verdict,
-    bounding_boxes,
-)
+from robot_formation.alignment.mode import Verdict
+from robot_formation.alignment.observation import bounding_boxes
+from robot_formation.alignment.paper_mode import AlignmentParameters, PaperAlignment
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
 P = AlignmentParameters()
 NEAR, FAR = 60, 40  # side lengths [px] on both sides of the 50 px at the formation distance
-IN_PLACE = Block(TARGET, 158, 60, 49, 49)
+IN_PLACE = Block(Face.TARGET, 158, 60, 49, 49)
 
 
 def parameters(**values):
@@ -43,17 +38,17 @@ FORWARD, BACK, AWAY = 1.0, -1.0, -1.0  # the neighbour is on the left, so away i
 @pytest.mark.parametrize(
     ("blocks", "x_m", "y_m"),
     [
-        ([block(FRONT, FAR)], BACK * 0.05, 0.0),
-        ([block(FRONT, NEAR)], BACK * 0.05, AWAY * 0.05),
-        ([block(REAR, FAR)], FORWARD * 0.05, 0.0),
-        ([block(REAR, NEAR)], FORWARD * 0.05, AWAY * 0.05),
-        ([block(FRONT, NEAR), block(TARGET, NEAR)], BACK * 0.02, 0.0),
-        ([block(TARGET, FAR), block(FRONT, FAR)], BACK * 0.02, 0.0),
-        ([block(REAR, NEAR), block(TARGET, NEAR)], FORWARD * 0.02, 0.0),
-        ([block(TARGET, FAR), block(REAR, FAR)], FORWARD * 0.02, 0.0),
-        ([block(FRONT, FAR), block(REAR, FAR)], 0.0, AWAY * 0.05),
-        ([block(FRONT), block(TARGET), block(REAR)], 0.0, AWAY * 0.05),
-        ([block(FRONT, 20, 140, 60), block(FRONT, 18, 159, 60)], BACK * 0.05, 0.0),
+        ([block(Face.FRONT, FAR)], BACK * 0.05, 0.0),
+        ([block(Face.FRONT, NEAR)], BACK * 0.05, AWAY * 0.05),
+        ([block(Face.REAR, FAR)], FORWARD * 0.05, 0.0),
+        ([block(Face.REAR, NEAR)], FORWARD * 0.05, AWAY * 0.05),
+        ([block(Face.FRONT, NEAR), block(Face.TARGET, NEAR)], BACK * 0.02, 0.0),
+        ([block(Face.TARGET, FAR), block(Face.FRONT, FAR)], BACK * 0.02, 0.0),
+        ([block(Face.REAR, NEAR), block(Face.TARGET, NEAR)], FORWARD * 0.02, 0.0),
+        ([block(Face.TARGET, FAR), block(Face.REAR, FAR)], FORWARD * 0.02, 0.0),
+        ([block(Face.FRONT, FAR), block(Face.REAR, FAR)], 0.0, AWAY * 0.05),
+        ([block(Face.FRONT), block(Face.TARGET), block(Face.REAR)], 0.0, AWAY * 0.05),
+        ([block(Face.FRONT, 20, 140, 60), block(Face.FRONT, 18, 159, 60)], BACK * 0.05, 0.0),
     ],
     ids=[
         "front only, far: back",
@@ -76,8 +71,8 @@ def test_every_row_of_the_rule_table_moves_in_its_direction(blocks, x_m, y_m):
 
 def test_the_steps_outside_the_target_area_are_parameters():
     alignment = PaperAlignment(parameters(coarse_step_m=0.04, fine_step_m=0.01))
-    moves(alignment.assess([block(FRONT, NEAR)]), -0.04, -0.04)
-    moves(alignment.assess([block(REAR), block(TARGET)]), 0.01)
+    moves(alignment.assess([block(Face.FRONT, NEAR)]), -0.04, -0.04)
+    moves(alignment.assess([block(Face.REAR), block(Face.TARGET)]), 0.01)
 
 
 def test_near_and_far_part_at_the_side_length_of_the_formation_distance_taken_with_the_detectors_bias():
@@ -85,8 +80,8 @@ def test_near_and_far_part_at_the_side_length_of_the_formation_distance_taken_wi
     alignment = PaperAlignment(P)
     below, above = math.floor(exact), math.floor(exact) + 1
     assert below < exact < above
-    moves(alignment.assess([Block(FRONT, 158, 60, 10, below)]), BACK * 0.05)
-    moves(alignment.assess([Block(FRONT, 158, 60, above, 10)]), BACK * 0.05, AWAY * 0.05)
+    moves(alignment.assess([Block(Face.FRONT, 158, 60, 10, below)]), BACK * 0.05)
+    moves(alignment.assess([Block(Face.FRONT, 158, 60, above, 10)]), BACK * 0.05, AWAY * 0.05)
 
 
 @pytest.mark.parametrize("signature", [4, 5, 7, 0, 12])
@@ -105,7 +100,7 @@ def test_target_in_its_place_is_aligned():
 @pytest.mark.parametrize(("x", "verdict"), [(95, "move"), (96, "aligned"), (104, "aligned"), (105, "move")])
 def test_the_column_is_inside_up_to_the_tolerance_itself(x, verdict):
     alignment = PaperAlignment(parameters(target_x_px=100.0, v_tolerance_px=4.0))
-    found = alignment.assess([block(TARGET, x=x)])
+    found = alignment.assess([block(Face.TARGET, x=x)])
     assert found.verdict.value == verdict
     if verdict == "move":
         assert math.copysign(1, found.motion.x_m) == math.copysign(1, x - 100)
@@ -115,7 +110,7 @@ def test_the_column_is_inside_up_to_the_tolerance_itself(x, verdict):
 def test_the_distance_is_inside_up_to_the_tolerance(side, verdict):
     # Without bias: 10 px m / 50 px = 0.2 m; the tolerance of 5 cm ends at 0.25 m (40 px) and 0.15 m (66.7 px).
     alignment = PaperAlignment(parameters(side_px_m=10.0, side_bias_px=0.0, distance_m=0.2, u_tolerance_m=0.05))
-    found = alignment.assess([block(TARGET, side)])
+    found = alignment.assess([block(Face.TARGET, side)])
     assert found.verdict.value == verdict
     if verdict == "move":
         moves(found, y_m=10.0 / side - 0.2)
@@ -123,23 +118,23 @@ def test_the_distance_is_inside_up_to_the_tolerance(side, verdict):
 
 def test_a_distance_exactly_at_the_tolerance_is_inside():
     alignment = PaperAlignment(parameters(side_px_m=16.0, side_bias_px=0.0, distance_m=0.25, u_tolerance_m=0.25))
-    assert alignment.assess([block(TARGET, 32)]).verdict is Verdict.ALIGNED  # 16/32 - 0.25 = 0.25 exactly
+    assert alignment.assess([block(Face.TARGET, 32)]).verdict is Verdict.ALIGNED  # 16/32 - 0.25 = 0.25 exactly
 
 
 @pytest.mark.parametrize(
     ("width", "height", "turns"), [(45, 49, False), (49, 45, False), (44, 49, True), (49, 44, True)]
 )
 def test_side_lengths_may_differ_by_the_tolerance_itself(width, height, turns):
-    found = PaperAlignment(P).assess([Block(TARGET, 158, 60, width, height)])
+    found = PaperAlignment(P).assess([Block(Face.TARGET, 158, 60, width, height)])
     assert (found.verdict is Verdict.MOVE) == turns
     assert abs(found.motion.yaw_rad) == (pytest.approx(math.radians(5.0)) if turns else 0.0)
 
 
 def test_v_comes_before_u_and_u_before_the_turn():
     alignment = PaperAlignment(P)
-    first = alignment.assess([Block(TARGET, 200, 60, 20, 30)])
-    second = alignment.assess([Block(TARGET, 158, 60, 20, 30)])
-    third = alignment.assess([Block(TARGET, 158, 60, 40, 49)])
+    first = alignment.assess([Block(Face.TARGET, 200, 60, 20, 30)])
+    second = alignment.assess([Block(Face.TARGET, 158, 60, 20, 30)])
+    third = alignment.assess([Block(Face.TARGET, 158, 60, 40, 49)])
     assert [found.reason for found in (first, second, third)] == ["fine-tune v", "fine-tune u", "turn"]
     for found, component in ((first, "x_m"), (second, "y_m"), (third, "yaw_rad")):
         others = {"x_m", "y_m", "yaw_rad"} - {component}
@@ -149,14 +144,14 @@ def test_v_comes_before_u_and_u_before_the_turn():
 
 def test_single_corrections_are_cut_to_their_longest_step():
     alignment = PaperAlignment(parameters(max_v_step_m=0.06, max_u_step_m=0.03))
-    moves(alignment.assess([block(TARGET, x=300)]), x_m=0.06)
-    moves(alignment.assess([block(TARGET, x=20)]), x_m=-0.06)
-    moves(alignment.assess([block(TARGET, side=20)]), y_m=0.03)
-    moves(alignment.assess([block(TARGET, side=120)]), y_m=-0.03)
+    moves(alignment.assess([block(Face.TARGET, x=300)]), x_m=0.06)
+    moves(alignment.assess([block(Face.TARGET, x=20)]), x_m=-0.06)
+    moves(alignment.assess([block(Face.TARGET, side=20)]), y_m=0.03)
+    moves(alignment.assess([block(Face.TARGET, side=120)]), y_m=-0.03)
 
 
 def turn_of(alignment, difference):
-    return alignment.assess([Block(TARGET, 158, 60, 49 - difference, 49)]).motion.yaw_rad
+    return alignment.assess([Block(Face.TARGET, 158, 60, 49 - difference, 49)]).motion.yaw_rad
 
 
 def test_a_turn_goes_on_while_it_helps_and_reverses_each_time_it_made_things_worse():
@@ -170,8 +165,8 @@ def test_a_turn_goes_on_while_it_helps_and_reverses_each_time_it_made_things_wor
 def test_after_the_bound_of_moves_the_follower_goes_on_unaligned_with_the_reason():
     alignment = PaperAlignment(parameters(max_moves=3))
     for _ in range(3):
-        assert alignment.assess([block(TARGET, x=200)]).verdict is Verdict.MOVE
-    found = alignment.assess([block(TARGET, x=200)])
+        assert alignment.assess([block(Face.TARGET, x=200)]).verdict is Verdict.MOVE
+    found = alignment.assess([block(Face.TARGET, x=200)])
     assert found.verdict is Verdict.UNALIGNED
     assert "3 moves" in found.reason
     assert "fine-tune v" in found.reason
@@ -179,13 +174,13 @@ def test_after_the_bound_of_moves_the_follower_goes_on_unaligned_with_the_reason
 
 def test_the_last_move_allowed_may_still_align():
     alignment = PaperAlignment(parameters(max_moves=1))
-    assert alignment.assess([block(TARGET, x=200)]).verdict is Verdict.MOVE
+    assert alignment.assess([block(Face.TARGET, x=200)]).verdict is Verdict.MOVE
     assert alignment.assess([IN_PLACE]).verdict is Verdict.ALIGNED
 
 
 def test_the_papers_bound_is_14_moves():
     alignment = PaperAlignment(P)
-    verdicts = [alignment.assess([block(FRONT)]).verdict for _ in range(15)]
+    verdicts = [alignment.assess([block(Face.FRONT)]).verdict for _ in range(15)]
     assert verdicts == [Verdict.MOVE] * 14 + [Verdict.UNALIGNED]
 
 
@@ -197,13 +192,13 @@ def test_empty_looks_are_repeated_and_at_their_bound_the_leader_is_lost():
 def test_empty_looks_count_only_in_a_row():
     alignment = PaperAlignment(parameters(max_empty_looks=2))
     assert alignment.assess([]).verdict is Verdict.LOOK
-    assert alignment.assess([block(TARGET, x=200)]).verdict is Verdict.MOVE
+    assert alignment.assess([block(Face.TARGET, x=200)]).verdict is Verdict.MOVE
     assert alignment.assess([]).verdict is Verdict.LOOK
     assert alignment.assess([]).verdict is Verdict.LOST
 
 
 def test_two_blocks_of_one_signature_are_one_box():
-    left, right = Block(TARGET, 145, 60, 20, 48), Block(TARGET, 171, 62, 24, 44)
+    left, right = Block(Face.TARGET, 145, 60, 20, 48), Block(Face.TARGET, 171, 62, 24, 44)
     (box,) = bounding_boxes([left, right]).values()
     assert (box.left, box.right, box.top, box.bottom) == (135, 183, 36, 84)
     assert (box.x, box.width, box.height, box.side) == (159, 48, 48, 48)
@@ -260,7 +255,7 @@ def seen_from(x_m, y_m):
     distance = DISTANCE_M - y_m  # further left is nearer to the face
     ahead = -x_m  # the face's middle lies behind a follower that is too far forward
     side = FOCAL_PX * EDGE_M / distance
-    return Block(TARGET, round(CENTRE_PX + FOCAL_PX * ahead / distance), 60, round(side), round(side))
+    return Block(Face.TARGET, round(CENTRE_PX + FOCAL_PX * ahead / distance), 60, round(side), round(side))
 
 
 @given(x=st.floats(-0.03, 0.03), y=st.floats(-0.08, 0.08))
@@ -277,8 +272,8 @@ def test_the_residual_is_the_way_to_the_place_as_a_pinhole_camera_tells_it(x, y)
 def test_without_the_target_face_there_is_no_residual():
     alignment = PaperAlignment(P)
     assert alignment.offset([]) is None
-    assert alignment.offset([block(FRONT), block(REAR)]) is None
-    assert alignment.offset([block(FRONT), block(TARGET)]) is not None
+    assert alignment.offset([block(Face.FRONT), block(Face.REAR)]) is None
+    assert alignment.offset([block(Face.FRONT), block(Face.TARGET)]) is not None
 
 
 def test_the_default_calibration_is_near_that_of_the_pinhole_camera():

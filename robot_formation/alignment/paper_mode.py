@@ -1,4 +1,4 @@
-"""What one look at the marker means: the paper's visual algorithm, as a rule table without input or output.
+"""`mode: paper`: what one look at the marker means by the paper's visual algorithm, as a rule table.
 
 Paper, "Visual fine-tuning process calibrations": reach the area where only the Target face is seen, then fine-tune the
 position along v by the block's column, then u by its side length. The paper's flow chart is missing; our reading of it
@@ -8,24 +8,27 @@ is documented in docs/explanation/paper.md ("Reading of the paper").
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
-from robot_formation.geometry.se2 import Motion
-from robot_formation.parameters import parameter
+from robot_formation.alignment.mode import Decision, Frames, Verdict
+from robot_formation.alignment.observation import FaceBox, bounding_boxes
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.parameters import ParameterError, parameter
+from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
-
-TARGET, FRONT, REAR = 1, 2, 3
 
 
 @dataclass(frozen=True)
 class AlignmentParameters:
-    """Camera calibration, tolerances and steps of the paper's fine-tuning."""
+    """Camera calibration, tolerances and steps of the paper's fine-tuning.
+
+    Cameras are calibrated at the default formation distance, `geometry.se2.FORMATION_DISTANCE_M`.
+    """
 
     target_x_px: float = parameter(158.5, "Column of the Target block in formation", unit="px", low=0.0, high=315.0)
     slope_px_per_m: float = parameter(
-        836.0, "Pan curve: columns per metre along v at the formation distance", unit="px/m", low=1.0, high=1e5
+        836.0, "Pan curve: columns per metre along v in a formation of 32 cm", unit="px/m", low=1.0, high=1e5
     )
     side_px_m: float = parameter(
         16.64,
@@ -38,7 +41,11 @@ class AlignmentParameters:
         2.65, "What the detector reports less than the true side length", unit="px", low=-20.0, high=20.0
     )
     distance_m: float = parameter(
-        0.328, "Distance from lens to Target face in formation", unit="m", low=0.01, high=10.0
+        0.328,
+        "Distance from lens to Target face in a formation of 32 cm, at which cameras are calibrated",
+        unit="m",
+        low=0.01,
+        high=10.0,
     )
     v_tolerance_px: float = parameter(5.0, "Tolerance of the column (paper: 5 px)", unit="px", low=0.0, high=100.0)
     u_tolerance_m: float = parameter(0.015, "Tolerance along u (paper: 1.5 cm)", unit="m", low=0.0, high=1.0)
@@ -59,75 +66,20 @@ class AlignmentParameters:
     )
     max_empty_looks: int = parameter(3, "Looks without a block after which the leader is lost", low=1, high=1000)
 
+    def at_distance(self, formation_distance_m: float) -> AlignmentParameters:
+        """Return the parameters for another formation distance [m], by pinhole projection from the calibrated one.
 
-class Verdict(Enum):
-    """What to do after a look."""
-
-    MOVE = "move"
-    LOOK = "look"
-    SEARCH = "search"
-    ALIGNED = "aligned"
-    UNALIGNED = "unaligned"
-    LOST = "lost"
-
-
-@dataclass(frozen=True)
-class Decision:
-    """The verdict of a look, the motion that goes with MOVE and SEARCH, and the reason in words."""
-
-    verdict: Verdict
-    motion: Motion = Motion()
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Box:
-    """Bounding box of the blocks of one signature: inclusive edges in pixels."""
-
-    left: float
-    right: float
-    top: float
-    bottom: float
-
-    @property
-    def x(self) -> float:
-        """Column of the centre, px."""
-        return (self.left + self.right) / 2.0
-
-    @property
-    def width(self) -> float:
-        """Width as the camera reports it, px."""
-        return self.right - self.left
-
-    @property
-    def height(self) -> float:
-        """Height as the camera reports it, px."""
-        return self.bottom - self.top
-
-    @property
-    def side(self) -> float:
-        """The longer side, px: a face seen obliquely is narrower, not lower."""
-        return max(self.width, self.height)
-
-
-def bounding_boxes(blocks: Iterable[Block]) -> dict[int, Box]:
-    """Merge the blocks of each marker signature into their bounding box (a face split by flicker counts once)."""
-    boxes: dict[int, Box] = {}
-    for block in blocks:
-        if block.signature not in (TARGET, FRONT, REAR):
-            continue
-        half_width, half_height = block.width / 2.0, block.height / 2.0
-        box = Box(block.x - half_width, block.x + half_width, block.y - half_height, block.y + half_height)
-        known = boxes.get(block.signature)
-        if known is not None:
-            box = Box(
-                min(known.left, box.left),
-                max(known.right, box.right),
-                min(known.top, box.top),
-                max(known.bottom, box.bottom),
+        Raises:
+            ParameterError: if the lens would be on the neighbour's Target face, or behind it.
+        """
+        distance_m = self.distance_m + (formation_distance_m - FORMATION_DISTANCE_M)
+        if distance_m <= 0.0:
+            raise ParameterError(
+                f"fine_tuner: 'formation_distance_m' of {formation_distance_m} leaves no distance between lens and "
+                f"Target face; it must be more than {FORMATION_DISTANCE_M - self.distance_m:.3f}"
             )
-        boxes[block.signature] = box
-    return boxes
+        slope_px_per_m = self.slope_px_per_m * (self.distance_m / distance_m)
+        return replace(self, distance_m=distance_m, slope_px_per_m=slope_px_per_m)
 
 
 class PaperAlignment:
@@ -145,7 +97,7 @@ class PaperAlignment:
 
     def offset(self, blocks: Iterable[Block]) -> Motion | None:
         """Estimate the way to the formation position in the follower's frame, or None without a Target block."""
-        target = bounding_boxes(blocks).get(TARGET)
+        target = bounding_boxes(blocks).get(Face.TARGET)
         if target is None:
             return None
         side = max(target.side + self._p.side_bias_px, 1.0)
@@ -163,23 +115,24 @@ class PaperAlignment:
             lost = self._empty_looks >= self._p.max_empty_looks
             return Decision(Verdict.LOST if lost else Verdict.LOOK, reason="no block in view")
         self._empty_looks = 0
-        decision = self._fine_tune(boxes[TARGET], blocks) if set(boxes) == {TARGET} else self._enter_target_area(boxes)
+        alone = set(boxes) == {Face.TARGET}
+        decision = self._fine_tune(boxes[Face.TARGET], blocks) if alone else self._enter_target_area(boxes)
         if decision.verdict is Verdict.MOVE:
             if self._moves >= self._p.max_moves:
                 return Decision(Verdict.UNALIGNED, reason=f"not aligned after {self._moves} moves: {decision.reason}")
             self._moves += 1
         return decision
 
-    def _enter_target_area(self, boxes: dict[int, Box]) -> Decision:
+    def _enter_target_area(self, boxes: dict[Face, FaceBox]) -> Decision:
         p = self._p
         seen = set(boxes)
         away = -p.coarse_step_m  # the follower drives on its neighbour's right, so away is to its own right
-        if len(seen) > 2 or seen == {FRONT, REAR}:
+        if len(seen) > 2 or seen == {Face.FRONT, Face.REAR}:
             return Decision(Verdict.MOVE, Motion(y_m=away), "too close: away along u")
-        sign, name = (-1.0, "ahead") if FRONT in seen else (1.0, "behind")
-        if TARGET in seen:
+        sign, name = (-1.0, "ahead") if Face.FRONT in seen else (1.0, "behind")
+        if Face.TARGET in seen:
             return Decision(Verdict.MOVE, Motion(x_m=sign * p.fine_step_m), f"{name}: fine step along v")
-        box = boxes[FRONT if FRONT in seen else REAR]
+        box = boxes[Face.FRONT if Face.FRONT in seen else Face.REAR]
         close = box.side + p.side_bias_px > p.side_px_m / p.distance_m
         return Decision(
             Verdict.MOVE,
@@ -187,7 +140,7 @@ class PaperAlignment:
             f"well {name}: coarse step along v" + (" and away along u" if close else ""),
         )
 
-    def _fine_tune(self, target: Box, blocks: list[Block]) -> Decision:
+    def _fine_tune(self, target: FaceBox, blocks: list[Block]) -> Decision:
         p = self._p
         offset = self.offset(blocks)
         assert offset is not None  # the Target block is in view here
@@ -205,3 +158,32 @@ class PaperAlignment:
             self._difference_before_turn = difference
             return Decision(Verdict.MOVE, Motion(yaw_rad=self._turn_sign * p.turn_step_rad), "turn")
         return Decision(Verdict.ALIGNED, reason="inside the tolerances")
+
+
+class PaperMode:
+    """`mode: paper` behind the protocol: every timestep is a new alignment, and only a look's last frame counts."""
+
+    def __init__(self, parameters: AlignmentParameters) -> None:
+        self._p = parameters
+        self._alignment = PaperAlignment(parameters)
+        self._blocks: Sequence[Block] = ()
+
+    def restart(self, timestep: int) -> None:
+        """See `AlignmentMode`."""
+        self._alignment = PaperAlignment(self._p)
+
+    def turn(self) -> float:
+        """See `AlignmentMode`; the rule table leaves the heading alone."""
+        return 0.0
+
+    def moved(self, asked: Motion, motion: Motion) -> None:
+        """See `AlignmentMode`; the rule table has no memory of moves."""
+
+    def assess(self, frames: Frames) -> Decision:
+        """See `AlignmentMode`."""
+        self._blocks = frames[-1]
+        return self._alignment.assess(self._blocks)
+
+    def offset(self) -> Motion | None:
+        """See `AlignmentMode`."""
+        return self._alignment.offset(self._blocks)

@@ -1,0 +1,58 @@
+"""The formation distance as a parameter: alignments by rendered pictures end beside the neighbour at that distance."""
+
+from dataclasses import replace
+
+import pytest
+
+from robot_formation.alignment.paper_mode import AlignmentParameters
+from robot_formation.calibration.alignment_trial import AlignmentTrial, Equipment, Start
+from robot_formation.components.block_detector import BlockDetectorNodeParameters
+from robot_formation.components.world import WorldNodeParameters
+from robot_formation.drive.movement_system import DriveParameters
+from robot_formation.experiment.scenario import node_defaults
+from robot_formation.follower.fine_tuning import FineTunerParameters
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+from robot_formation.parameters import ParameterError, from_mapping
+from robot_formation.surface import make_surface
+
+
+def equipment(mode: str, distance_m: float) -> Equipment:
+    """The default robots on level ground."""
+    return Equipment(
+        make_surface("plane"),
+        from_mapping(WorldNodeParameters, node_defaults("world"), where="world"),
+        DriveParameters(),
+        from_mapping(BlockDetectorNodeParameters, node_defaults("block_detector"), where="block_detector"),
+        FineTunerParameters(mode=mode, formation_distance_m=distance_m),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["paper", "precise"])
+@pytest.mark.parametrize("distance_m", [0.30, 0.35])
+def test_an_alignment_ends_in_formation_at_the_distance_that_is_asked_for(mode: str, distance_m: float) -> None:
+    trial = AlignmentTrial(equipment(mode, distance_m), Start(0.33, 0.02, 0.0), seed=4).run()
+    assert trial.outcome == "aligned"
+    assert not trial.touched
+    u_m, v_m, _ = trial.errors  # of the formation with this distance
+    assert u_m == pytest.approx(0.0, abs=0.016)
+    assert v_m == pytest.approx(0.0, abs=0.008)
+
+
+def test_at_the_distance_of_the_calibration_it_holds_as_it_is() -> None:
+    assert AlignmentParameters().at_distance(FORMATION_DISTANCE_M) == AlignmentParameters()
+
+
+def test_nearer_by_some_way_the_lens_is_so_much_nearer_and_columns_change_more() -> None:
+    p = AlignmentParameters()
+    near = p.at_distance(FORMATION_DISTANCE_M - 0.02)
+    assert near.distance_m == pytest.approx(p.distance_m - 0.02)
+    assert near.slope_px_per_m * near.distance_m == pytest.approx(p.slope_px_per_m * p.distance_m)  # focal length
+    assert replace(near, distance_m=p.distance_m, slope_px_per_m=p.slope_px_per_m) == p
+
+
+def test_a_distance_at_which_the_bodies_would_not_keep_clear_is_refused() -> None:
+    with pytest.raises(ParameterError, match=r"must be at least 0\.263"):
+        FineTunerParameters(formation_distance_m=0.25)
+    with pytest.raises(ParameterError, match="between lens and Target face"):
+        FineTunerParameters(mode="paper", formation_distance_m=0.06, alignment=AlignmentParameters(distance_m=0.2))
