@@ -21,7 +21,6 @@ from robot_formation.components.node_parameters import (
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
-from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.marker import MarkerKind
@@ -148,7 +147,8 @@ def build(setup: Setup, settings: Settings) -> Scenario:
         values = {**node_defaults(kind, setup.marker), **settings.get(kind, {}), **follows}
         return from_mapping(cls, values, where=kind)
 
-    world = made(WorldNodeParameters, "world", **_starts(setup))
+    fine_tuner = made(FineTunerNodeParameters, "fine_tuner")
+    world = made(WorldNodeParameters, "world", **_starts(setup, fine_tuner.formation_distance_m))
     own = settings.get("overhead_tracker", {})
     known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
     return Scenario(
@@ -159,7 +159,7 @@ def build(setup: Setup, settings: Settings) -> Scenario:
         made(DriveParameters, "drive"),
         made(BlockDetectorNodeParameters, "block_detector"),
         made(PredictorParameters, "predictor"),
-        made(FineTunerNodeParameters, "fine_tuner"),
+        fine_tuner,
         made(LeaderParameters, "leader", followers=_robots(setup)[1:]),
     )
 
@@ -171,11 +171,11 @@ def _robots(setup: Setup) -> list[str]:
     return [names.LEADER, *(names.follower(n) for n in range(1, setup.followers + 1))]
 
 
-def _starts(setup: Setup) -> dict[str, object]:
+def _starts(setup: Setup, distance_m: float) -> dict[str, object]:
     """Return the world's parameters that follow from the setup: each robot stands on the right of the one before."""
     robots, heading = _robots(setup), math.radians(setup.heading_deg)
     right = (math.sin(heading), -math.cos(heading))
-    places = [FORMATION_DISTANCE_M * n for n in range(len(robots))]
+    places = [distance_m * n for n in range(len(robots))]
     return {
         "seed": setup.seed,
         "robots": robots,

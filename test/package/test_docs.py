@@ -1,38 +1,26 @@
 """README and docs agree with the code: topics, parameters, graph, verbs, links."""
 
 import importlib.util
-import inspect
-import json
 import re
-import shlex
 from dataclasses import fields, replace
 from pathlib import Path
 from types import ModuleType
 
 import pytest
-from test_layers import LAYERS
 
 from repository import PACKAGE, ROOT
 from robot_formation import names
-from robot_formation.analysis.quantities import analyse
-from robot_formation.analysis.report import text_report
-from robot_formation.cli.main import VERBS, make_parser
-from robot_formation.cli.main import main as command_line
+from robot_formation.cli.main import VERBS
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.in_memory_record import run_in_memory
-from robot_formation.experiment.scenario import load_track, override
-from robot_formation.follower.fine_tuning import LookParameters
+from robot_formation.experiment.scenario import load_track
 from robot_formation.launching.arguments import ARGUMENTS
-from robot_formation.launching.watchdog import Watchdog
 from robot_formation.names import Qos, Topic
 from robot_formation.parameters import specs
 
 NODE_PAGES = ROOT / "docs" / "reference" / "nodes"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md", *(ROOT / "docs").rglob("*.md")]
 NODES = [*KINDS, "recorder", "player", "progress"]
-LONGEST_ITEM = 90  # words
-RE_BLOCK = re.DOTALL | re.MULTILINE
 QOS = {
     "event": names.EVENT,
     "history": names.HISTORY,
@@ -237,130 +225,3 @@ def test_relative_links_lead_somewhere(page: Path) -> None:
         if not target.exists() or (anchor and anchor not in anchors(target)):
             broken.append(link)
     assert broken == []
-
-
-def pages_text(page):
-    return page.read_text(encoding="utf-8")
-
-
-def code_blocks(text):
-    """The lines of each code block that names no language."""
-    return [block.splitlines() for block in re.findall(r"^```\n(.*?)^```", text, re.DOTALL | re.MULTILINE)]
-
-
-ARCHITECTURE = ROOT / "docs" / "explanation" / "architecture.md"
-
-
-def rows_of(page):
-    """The rows of the first table below the heading Rooms: (room, holds, where to look for what)."""
-    section = pages_text(page).split("## Rooms\n")[1].split("\n## ")[0]
-    return re.findall(r"^\| `(\w+)` \| (.*?) \| (.*?) \|$", section, re.MULTILINE)
-
-
-def test_the_architecture_lists_every_room_in_the_order_of_the_layers():
-    rooms = [room for layer in reversed(LAYERS) for room in layer if (PACKAGE / room).is_dir() and room]
-    assert [room for room, _, _ in rows_of(ARCHITECTURE)] == rooms
-
-
-def test_what_the_architecture_places_in_a_room_is_there():
-    for room, _, places in rows_of(ARCHITECTURE):
-        for place in re.findall(r"`([\w*]+(?:\.py|/))`", places):
-            assert list((PACKAGE / room).glob(place.rstrip("/"))), f"{room}: {place}"
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_files_that_a_page_names_exist(page):
-    """In backticks or in commands: Python files by the end of their path, folders of the package by theirs."""
-    text = pages_text(page)
-    files = {file.relative_to(ROOT).as_posix() for file in ROOT.rglob("*.py") if ".venv" not in file.parts}
-    named = set(re.findall(r"`([\w/]+\.py)`", text)) | set(re.findall(r"python ([\w/]+\.py)", text))
-    missing = {name for name in named if not any(f"/{file}".endswith(f"/{name}") for file in files)}
-    missing |= {folder for folder in re.findall(r"`(robot_formation/[a-z_/]+)`", text) if not (ROOT / folder).exists()}
-    assert missing - {"driver.py"} == set()
-
-
-def test_the_index_lists_every_page_once():
-    text = pages_text(ROOT / "docs" / "README.md")
-    linked = [(ROOT / "docs" / link).resolve() for link in re.findall(r"\]\(([^)#]+\.md)\)", text)]
-    assert sorted(linked) == sorted([*(ROOT / "docs").glob("*/**/*.md"), ROOT / "bags" / "README.md"])
-
-
-def test_every_page_belongs_to_one_of_four_kinds():
-    kinds = {page.relative_to(ROOT / "docs").parts[0] for page in (ROOT / "docs").rglob("*.md")}
-    assert kinds == {"README.md", "tutorial", "how-to", "reference", "explanation"}
-
-
-def test_the_readme_is_short():
-    assert len(pages_text(ROOT / "README.md").splitlines()) <= 250
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_lines_are_wrapped_and_list_items_are_short(page):
-    text = re.sub(r"^```.*?^```|<!-- parameters -->.*?<!-- /parameters -->", "", pages_text(page), flags=RE_BLOCK)
-    prose = [line for line in text.splitlines() if not line.startswith(("|", "!["))]
-    assert [line for line in prose if len(line) > 120] == []
-    items = re.findall(r"^(?:- |\d+\. ).*?(?=\n\s*\n|\n- |\n\d+\. |\Z)", "\n".join(prose), re.DOTALL | re.MULTILINE)
-    assert [item[:60] for item in items if len(item.split()) > LONGEST_ITEM] == []
-
-
-def test_the_page_of_quantities_lists_the_keys_of_the_json(capsys):
-    page = pages_text(ROOT / "docs" / "reference" / "quantities.md")
-
-    def documented(part):
-        table = re.search(rf"<!-- {part} -->(.*?)<!-- /{part} -->", page, re.DOTALL)[1]
-        cells = re.findall(r"^\| (`.*?) \|", table, re.MULTILINE)
-        return {key for cell in cells for key in re.findall(r"`(\w+)`", cell)}
-
-    assert command_line(["analyze", str(ROOT / "bags" / "samples" / "track_two_formation"), "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert documented("run") == set(found)
-    assert documented("timestep") == set(found["timesteps"][0])
-    assert documented("totals") == set(found["totals"])
-    assert all(f"`{name}`" in page for name in found["conditions"])
-
-
-def test_the_architectures_time_limits_are_the_watchdogs():
-    limits = {name: p.default for name, p in inspect.signature(Watchdog).parameters.items() if name.endswith("_s")}
-    page = pages_text(ARCHITECTURE)
-    for said, name in (
-        ("(state T)", "stopped_s"),
-        ("while others do", "silent_s"),
-        ("never reported", "starting_s"),
-        ("no robot does anything", "idle_s"),
-    ):
-        assert re.search(rf"^\|.*{re.escape(said)} \| {limits[name]:g} s", page, re.MULTILINE), name
-
-
-def test_the_pages_of_the_fine_tuner_and_the_architecture_say_how_long_a_look_lasts():
-    look = LookParameters()
-    assert (look.frames, look.stable_frames, look.extra_frames, look.max_extensions) == (22, 3, 10, 3)
-    fine_tuner = " ".join(pages_text(NODE_PAGES / "fine_tuner.md").split())
-    assert "A look lasts 22 frames" in fine_tuner
-    assert "ten more, up to three times, while the last three frames do not" in fine_tuner
-    architecture = " ".join(pages_text(ARCHITECTURE).split())
-    assert "`camera/request` for 22 frames" in architecture
-    assert (
-        "the last three frames report the same blocks; otherwise ten more frames are asked for, three times at most"
-        in (architecture)
-    )
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_commands_of_a_page_are_understood(page):
-    """The command line's parser takes each `formation VERB ...` of a code block, as it stands there."""
-    lines = [line for block in code_blocks(pages_text(page).replace("\\\n", " ")) for line in block]
-    commands = [line for line in lines if re.match(r"(\./)?formation (?!error)\w", line)]
-    for command in commands:
-        make_parser().parse_args(shlex.split(command)[1:])
-
-
-@pytest.mark.slow
-def test_the_run_that_the_readme_and_the_tutorial_show_is_what_a_run_gives():
-    record = run_in_memory(override(load_track("two"), ["seed=3"]))
-    report = text_report(record, analyse(record)).splitlines()
-    tutorial = pages_text(ROOT / "docs" / "tutorial" / "first_run.md").split("## 6.")[0]  # another run follows
-    for text in (pages_text(ROOT / "README.md"), tutorial):
-        lines = [line for block in code_blocks(text) for line in block]
-        figures = [line for line in lines if re.match(r" +\d+ .*\d\.\d\d|[a-z ]+  +\d", line)]
-        assert len(figures) > 4
-        assert [line for line in figures if line not in report and not line.startswith("timestep ")] == []
