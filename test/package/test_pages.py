@@ -8,7 +8,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from robot_formation.alignment.paper_rules import AlignmentParameters
+from robot_formation.alignment.paper_mode import AlignmentParameters
 from test_docs import NODE_PAGES, PAGES
 from test_layers import LAYERS
 
