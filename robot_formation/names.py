@@ -8,8 +8,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 from robot_formation.errors import FormationError
+
+Message: TypeAlias = Any
+"""A ROS message: ROS generates the classes, and they carry no types."""
 
 LEADER = "leader"
 PROGRESS = "progress"

@@ -5,8 +5,9 @@ Matplotlib is imported when a picture is drawn, and draws without a display (Agg
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from robot_formation.analysis.quantities import Corrections, FollowerAnalysis, R
 from robot_formation.analysis.run_record import Ground, RunRecord, Track
 from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.names import LEADER
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Okabe and Ito's palette, safe for colour-blind readers; leader orange and follower blue as in the paper's figures.
 _LEADER_COLOUR = "#E69F00"
@@ -87,7 +91,7 @@ def _figure(width: float, height: float, rows: int = 1) -> tuple[Any, Any]:
     return figure, figure.subplots(rows, 1, sharex=True)
 
 
-def _contours(axes: Any, ground: Ground) -> None:
+def _contours(axes: Axes, ground: Ground) -> None:
     from matplotlib.tri import Triangulation
 
     x, y, z = ground.vertices_m.T
@@ -100,7 +104,7 @@ def _contours(axes: Any, ground: Ground) -> None:
     axes.plot([], [], color="0.65", linewidth=0.8, label="height (mm)")
 
 
-def _path(axes: Any, track: Track, stops_ns: list[int], colour: str, label: str) -> None:
+def _path(axes: Axes, track: Track, stops_ns: list[int], colour: str, label: str) -> None:
     xy = track.positions_m[:, :2] * _CM
     axes.plot(*xy.T, color=colour, linewidth=1.8, label=label, zorder=3)
     at_rest = [(pose.x_m * _CM, pose.y_m * _CM) for stamp in stops_ns if (pose := track.at(stamp)) is not None]
@@ -108,7 +112,7 @@ def _path(axes: Any, track: Track, stops_ns: list[int], colour: str, label: str)
         axes.plot(*np.array(at_rest).T, ".", color=colour, markersize=6, zorder=3)
 
 
-def _ends(axes: Any, record: RunRecord, analysis: RunAnalysis) -> None:
+def _ends(axes: Axes, record: RunRecord, analysis: RunAnalysis) -> None:
     """Mark where each robot started and stopped, and where a follower lost its neighbour."""
     lost = {follower.name for follower in analysis.followers if follower.lost}
     starts = [track.positions_m[0, :2] for track in record.tracks.values()]
@@ -120,12 +124,12 @@ def _ends(axes: Any, record: RunRecord, analysis: RunAnalysis) -> None:
     _mark(axes, crosses, marker="x", label="lost", color=_LOST_COLOUR, markersize=11, markeredgewidth=3.0)
 
 
-def _mark(axes: Any, points_m: list[NDArray[np.float64]], **style: Any) -> None:
+def _mark(axes: Axes, points_m: list[NDArray[np.float64]], **style: Any) -> None:
     if points_m:
         axes.plot(*(np.array(points_m) * _CM).T, linestyle="none", zorder=4, **style)
 
 
-def _bars(axes: Any, follower: FollowerAnalysis, planned: int | None) -> None:
+def _bars(axes: Axes, follower: FollowerAnalysis, planned: int | None) -> None:
     numbers = [timestep.t for timestep in follower.timesteps]
     rows = [timestep.corrections for timestep in follower.timesteps]
     last = max(planned or 0, len(numbers) + (follower.unfinished is not None), COLLECTION_TIMESTEPS + 1)
@@ -148,12 +152,12 @@ def _components(rows: list[Corrections]) -> NDArray[np.float64]:
     return np.array([(row.u_m, row.v_m) for row in rows]).reshape(-1, 2) * _CM
 
 
-def _stack(axes: Any, numbers: list[int], uv_cm: NDArray[np.float64], alpha: float) -> None:
+def _stack(axes: Axes, numbers: list[int], uv_cm: NDArray[np.float64], alpha: float) -> None:
     labelled = alpha == 1.0
-    edge = {"edgecolor": "white", "linewidth": 0.5, "width": 0.72, "alpha": alpha}
-    axes.bar(numbers, uv_cm[:, 1], color=_V_COLOUR, label="v (forward)" if labelled else None, **edge)
+    draw = partial(axes.bar, numbers, edgecolor="white", linewidth=0.5, width=0.72, alpha=alpha)
+    draw(uv_cm[:, 1], color=_V_COLOUR, label="v (forward)" if labelled else None)
     label = "u (lateral)" if labelled else None
-    axes.bar(numbers, uv_cm[:, 0], bottom=uv_cm[:, 1], color=_U_COLOUR, hatch="///", label=label, **edge)
+    draw(uv_cm[:, 0], bottom=uv_cm[:, 1], color=_U_COLOUR, hatch="///", label=label)
 
 
 def _title(record: RunRecord, analysis: RunAnalysis) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,10 @@ from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.forecasts import OneStepForecasts
 from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
 from robot_formation.analysis.quantiles import NORMAL_90
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Okabe and Ito's palette, safe for colour-blind readers.
 _COLOURS = ("#0072B2", "#E69F00", "#009E73")
@@ -51,7 +55,9 @@ def draw_forecasts(log: DisplacementLog, forecasts: Sequence[OneStepForecasts], 
     return save_figure(figure, path)
 
 
-def _panel(axes: Any, target_m: NDArray[np.float64], forecast: OneStepForecasts, row: int, colour: str) -> None:
+def _panel(axes: Axes, target_m: NDArray[np.float64], forecast: OneStepForecasts, row: int, colour: str) -> None:
+    from matplotlib.ticker import MaxNLocator
+
     numbers = np.arange(1, len(target_m) + 1)
     mean = forecast.means_m[:, row] * _CM
     low, high = _band_cm(forecast, row)
@@ -62,7 +68,7 @@ def _panel(axes: Any, target_m: NDArray[np.float64], forecast: OneStepForecasts,
         numbers, target_m * _CM, linestyle="none", marker="o", markersize=1.6 if many else 4, color="black", zorder=4
     )
     axes.set_xlim(0.5, len(numbers) + 0.5)
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.xaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], integer=True))
     axes.grid(color="0.88", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -73,7 +79,7 @@ def _band_cm(forecast: OneStepForecasts, row: int) -> NDArray[np.float64]:
     return np.stack([forecast.means_m[:, row] - half, forecast.means_m[:, row] + half]) * _CM
 
 
-def _limit(axes: Any, target_m: NDArray[np.float64], forecasts: Sequence[OneStepForecasts], row: int) -> None:
+def _limit(axes: Axes, target_m: NDArray[np.float64], forecasts: Sequence[OneStepForecasts], row: int) -> None:
     """Show every mark, and bands as far as they don't make all else flat."""
     marks = np.concatenate([target_m, *(forecast.means_m[:, row] for forecast in forecasts)]) * _CM
     low, high = float(np.nanmin(marks)), float(np.nanmax(marks))
@@ -83,7 +89,7 @@ def _limit(axes: Any, target_m: NDArray[np.float64], forecasts: Sequence[OneStep
     axes.set_ylim(max(low - span, float(np.nanmin(bands))) - margin, min(high + span, float(np.nanmax(bands))) + margin)
 
 
-def _legend(figure: Any, target: str) -> None:
+def _legend(figure: Figure, target: str) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

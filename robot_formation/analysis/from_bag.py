@@ -21,6 +21,7 @@ from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.reader import read_bag
 from robot_formation.geometry.orientation import yaw_rad
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import Message
 from robot_formation.parameters import suggestion
 
 _TRIANGLE_LIST = 11
@@ -53,7 +54,7 @@ def run_record(bag: FormationBag) -> RunRecord:
     robots = _robots(bag)
     wanted = run_topics(robots)
     bag.require({topic: type_name for topic, type_name in wanted.items() if topic in bag.topics})
-    messages: dict[str, list[Any]] = defaultdict(list)
+    messages: dict[str, list[Message]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
     for message in bag.messages(wanted):
         messages[message.topic].append(message.message)
@@ -63,7 +64,7 @@ def run_record(bag: FormationBag) -> RunRecord:
 
 def record_of(
     robots: Sequence[str],
-    messages: Mapping[str, Sequence[Any]],
+    messages: Mapping[str, Sequence[Message]],
     details: Mapping[str, str],
     stamps: Mapping[str, Sequence[int]] | None = None,
 ) -> RunRecord:
@@ -109,7 +110,7 @@ def load_displacements(path: str | Path, robot: str, namespace: str | None = Non
         topics = {topic.of(robot): topic.type for topic in _LOGGED}
         _require_displacements(bag, robot)
         bag.require({topic: type_name for topic, type_name in topics.items() if topic in bag.topics})
-        messages: dict[str, list[Any]] = defaultdict(list)
+        messages: dict[str, list[Message]] = defaultdict(list)
         for message in bag.messages(topics):
             messages[message.topic].append(message.message)
     if not messages[names.DISPLACEMENT.of(robot)]:
@@ -135,7 +136,7 @@ def _require_displacements(bag: FormationBag, robot: str) -> None:
         raise AnalysisError(f"{bag.path} has no displacements of '{robot}'{suggestion(robot, robots)}")
 
 
-def _last_stamp_ns(messages: Mapping[str, Sequence[Any]]) -> int:
+def _last_stamp_ns(messages: Mapping[str, Sequence[Message]]) -> int:
     """Return the latest simulated time that a message tells (log times may count on by nanoseconds)."""
     return max(
         (_stamp_ns(group[-1]) for group in messages.values() if group and hasattr(group[-1], "header")), default=0
@@ -164,7 +165,9 @@ def run_topics(robots: Sequence[str]) -> dict[str, str]:
     return topics
 
 
-def _follower(robot: str, messages: Mapping[str, Sequence[Any]], stamps: Mapping[str, Sequence[int]]) -> FollowerRecord:
+def _follower(
+    robot: str, messages: Mapping[str, Sequence[Message]], stamps: Mapping[str, Sequence[int]]
+) -> FollowerRecord:
     moved, displacements, residuals, predictions = (_stamped(messages[topic.of(robot)]) for topic in _MOTIONS)
     states = names.ALIGNMENT.of(robot)
     return FollowerRecord(
@@ -179,7 +182,7 @@ def _follower(robot: str, messages: Mapping[str, Sequence[Any]], stamps: Mapping
     )
 
 
-def _stamped(messages: Sequence[Any]) -> tuple[Stamped, ...]:
+def _stamped(messages: Sequence[Message]) -> tuple[Stamped, ...]:
     """Turn PoseWithCovarianceStamped messages into stamped displacements; NaN where a negative variance says 'none'."""
     none = Motion(math.nan, math.nan)
     return tuple(
@@ -195,7 +198,7 @@ def _covariance_uv(covariance: Any) -> tuple[float, float, float]:
     return (float(covariance[7]), -float(covariance[1]), float(covariance[0]))
 
 
-def _stamp_ns(message: Any) -> int:
+def _stamp_ns(message: Message) -> int:
     stamp = message.header.stamp
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
@@ -208,7 +211,7 @@ def _yaw(quaternion: Any) -> float:
     return yaw_rad((quaternion.x, quaternion.y, quaternion.z, quaternion.w))
 
 
-def _track(messages: Sequence[Any]) -> Track | None:
+def _track(messages: Sequence[Message]) -> Track | None:
     """Turn Odometry messages into a true path, in order of their stamps."""
     if not messages:
         return None
@@ -221,7 +224,7 @@ def _track(messages: Sequence[Any]) -> Track | None:
 
 
 def _overhead(
-    robots: Sequence[str], messages: Mapping[str, Sequence[Any]], dot_height_m: float
+    robots: Sequence[str], messages: Mapping[str, Sequence[Message]], dot_height_m: float
 ) -> dict[str, OverheadTrack]:
     """Compare where the tracker saw each robot's dot with the dot's true places.
 

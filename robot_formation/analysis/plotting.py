@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robot_formation.analysis.errors import AnalysisError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DPI = 150
 _GAP = 0.01  # between a legend and the figure's lower edge, share of the figure's height
@@ -23,7 +26,7 @@ def new_figure(width: float, height: float) -> Any:
     return figure
 
 
-def legend_below(figure: Any, handles: Sequence[Any], columns: int, **style: Any) -> None:
+def legend_below(figure: Figure, handles: Sequence[Any], columns: int, **style: Any) -> None:
     """Write a legend, centred, below all panels, and let the layout keep its room free.
 
     Not by the place "outside lower center", which matplotlib has from 3.7 on only.
@@ -34,6 +37,8 @@ def legend_below(figure: Any, handles: Sequence[Any], columns: int, **style: Any
         columns: of the legend.
         style: further arguments of matplotlib's legend.
     """
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
     legend = figure.legend(
         handles=handles,
         loc="lower center",
@@ -44,10 +49,12 @@ def legend_below(figure: Any, handles: Sequence[Any], columns: int, **style: Any
         **style,
     )
     room = _GAP + legend.get_window_extent().height / figure.bbox.height
-    figure.get_layout_engine().set(rect=(0.0, room, 1.0, 1.0 - room))
+    engine = figure.get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        engine.set(rect=(0.0, room, 1.0, 1.0 - room))
 
 
-def save_figure(figure: Any, path: str | Path) -> Path:
+def save_figure(figure: Figure, path: str | Path) -> Path:
     """Write a figure; an older file there is replaced.
 
     Raises:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from robot_formation import names
 from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.geometry.orientation import Vector, quaternion
+from robot_formation.names import Message
 
 _POSES = re.compile(r"(.*)/ground_truth/([^/]+)/odom")
 _DESCRIPTIONS = re.compile(r"(.*)/([^/]+)/robot_description")
@@ -95,7 +96,7 @@ def _inside(namespace: str, topic: names.Topic) -> names.Topic:
     return replace(topic, name=names.absolute(namespace, topic.name))
 
 
-def _of_odometry(message: Any) -> Any:
+def _of_odometry(message: Message) -> Any:
     types = jazzy_typestore().types
     pose = message.pose.pose
     place = types["geometry_msgs/msg/Vector3"](pose.position.x, pose.position.y, pose.position.z)
@@ -103,7 +104,7 @@ def _of_odometry(message: Any) -> Any:
     return _transform(message.header, message.child_frame_id, turn)
 
 
-def _of_description(robot: str, text: str) -> Iterator[Any]:
+def _of_description(robot: str, text: str) -> Iterator[Message]:
     """Make one transform per joint of a URDF; a text that is none gives none."""
     types = jazzy_typestore().types
     if len(text) > _MOST_CHARACTERS or "<!DOCTYPE" in text:
@@ -136,7 +137,7 @@ def _vector(text: str) -> Vector:
     return (x, y, z)
 
 
-def _transform(header: Any, child: str, transform: Any) -> Any:
+def _transform(header: Message, child: str, transform: Message) -> Any:
     return jazzy_typestore().types["geometry_msgs/msg/TransformStamped"](header, child, transform)
 
 

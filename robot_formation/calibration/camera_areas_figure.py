@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robot_formation.analysis.plotting import new_figure, save_figure
 from robot_formation.calibration.camera_samples import CameraSample, Kind, Overlay, kinds_of, overlay
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _CM = 100.0
 # The paper's colours, from Okabe and Ito's palette.
@@ -60,7 +63,7 @@ def draw_areas(
     return save_figure(figure, path)
 
 
-def _overlaid(axes: Any, places: Iterable[Overlay], body_m: tuple[float, float], edge_m: float) -> None:
+def _overlaid(axes: Axes, places: Iterable[Overlay], body_m: tuple[float, float], edge_m: float) -> None:
     from matplotlib.patches import Patch
 
     places = list(places)
@@ -100,7 +103,7 @@ def _overlaid(axes: Any, places: Iterable[Overlay], body_m: tuple[float, float],
 
 
 def _single(
-    panel: Any, samples: Sequence[CameraSample], angle: float, body_m: tuple[float, float], edge_m: float
+    panel: Axes, samples: Sequence[CameraSample], angle: float, body_m: tuple[float, float], edge_m: float
 ) -> None:
     size = _cell(samples)
     for sample in samples:
@@ -120,7 +123,7 @@ def _single(
     panel.tick_params(labelsize=7)
 
 
-def _fill(axes: Any, u_m: float, v_m: float, size: float, kinds: Collection[Kind], *, attainable: bool) -> None:
+def _fill(axes: Axes, u_m: float, v_m: float, size: float, kinds: Collection[Kind], *, attainable: bool) -> None:
     found = [kind for kind in Kind if kind in kinds]
     if not attainable:
         _tile(axes, u_m, v_m, size, facecolor=_UNATTAINABLE)
@@ -135,7 +138,7 @@ def _fill(axes: Any, u_m: float, v_m: float, size: float, kinds: Collection[Kind
     _tile(axes, u_m, v_m, size, facecolor="none", edgecolor="white")
 
 
-def _tile(axes: Any, u_m: float, v_m: float, size: float, **style: Any) -> None:
+def _tile(axes: Axes, u_m: float, v_m: float, size: float, **style: Any) -> None:
     style = {"edgecolor": "white", "linewidth": 0.6, **style}
     axes.add_patch(_rectangle(u_m * _CM, v_m * _CM, size, size, **style))
 
@@ -146,7 +149,7 @@ def _rectangle(x: float, y: float, width: float, height: float, **style: Any) ->
     return Rectangle((x - width / 2.0, y - height / 2.0), width, height, **style)
 
 
-def _neighbour(axes: Any, body_m: tuple[float, float], edge_m: float) -> None:
+def _neighbour(axes: Axes, body_m: tuple[float, float], edge_m: float) -> None:
     length, width = body_m
     body = _rectangle(0.0, 0.0, width * _CM, length * _CM, facecolor="0.35", edgecolor="black", zorder=3)
     axes.add_patch(body)
@@ -156,7 +159,7 @@ def _neighbour(axes: Any, body_m: tuple[float, float], edge_m: float) -> None:
         axes.plot(*ends, color=_MARKER[name], linewidth=2.5, solid_capstyle="butt", zorder=5)
 
 
-def _frame(axes: Any, items: Sequence[Overlay] | Sequence[CameraSample]) -> None:
+def _frame(axes: Axes, items: Sequence[Overlay] | Sequence[CameraSample]) -> None:
     edge = max(item.u_m for item in items) * _CM + _cell(items) / 2.0
     axes.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal")
     ticks = [tick for tick in (-40, -20, 0, 20, 40) if abs(tick) < edge]

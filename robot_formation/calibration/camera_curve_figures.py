@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from robot_formation.analysis.plotting import new_figure, save_figure
 from robot_formation.calibration.camera_fit import WINDOW_M, CameraFit, FaceView, difference_px
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _CM = 100.0
 # Blue, orange and green as in the paper's figure, then further ones; from Okabe and Ito's palette.
@@ -70,7 +73,7 @@ def draw_pan(
     return save_figure(figure, path)
 
 
-def _differences(axes: Any, fit: CameraFit, views: Sequence[FaceView], compared_m: Sequence[float], v: Any) -> None:
+def _differences(axes: Axes, fit: CameraFit, views: Sequence[FaceView], compared_m: Sequence[float], v: Any) -> None:
     measured = {place: px for place, px in difference_px(views, compared_m).items() if abs(place) <= _SHOWN_M}
     columns = np.array([fit.column(u, v) for u in compared_m])
     axes.plot(v * _CM, np.ptp(columns, axis=0), color=_RED, linewidth=1.0, label="fitted")

@@ -17,6 +17,7 @@ from robot_formation.calibration.alignment_trial import FOLLOWER
 from robot_formation.calibration.camera_grid import Conditions, Position, measure, stand
 from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.drive.curves import CalibrationError
+from robot_formation.names import Message
 from robot_formation.parameters import to_mapping
 from robot_formation.world.description import robot_description
 from robot_formation.world.pose import Pose
@@ -108,5 +109,5 @@ def _odometry(pose: Pose, robot: str, stamp_ns: int) -> Any:
     )
 
 
-def _record(recorder: Recorder, robot: str, topic: names.Topic, message: Any) -> None:
+def _record(recorder: Recorder, robot: str, topic: names.Topic, message: Message) -> None:
     recorder.record_as(topic.of(robot), topic, conversions.to_cdr(message))

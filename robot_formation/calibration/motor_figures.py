@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -13,6 +13,9 @@ from robot_formation.analysis.plotting import legend_below, new_figure, save_fig
 from robot_formation.calibration.encoder_comparison import DistanceComparison
 from robot_formation.calibration.motor_fit import AxisFit
 from robot_formation.names import LEADER
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Okabe and Ito's palette; blue, red and green as in the paper's figure.
 _BLUE, _RED, _GREEN, _GREY = "#0072B2", "#D55E00", "#009E73", "0.80"
@@ -73,7 +76,7 @@ def draw_encoders(comparisons: Sequence[DistanceComparison], title: str, path: s
     return save_figure(figure, path)
 
 
-def _curve_panel(axes: Any, fit: AxisFit) -> None:
+def _curve_panel(axes: Axes, fit: AxisFit) -> None:
     rotations = [point.rotation_rad for point in fit.points]
     travels = np.array([point.travel for point in fit.points])
     driven = np.linspace(0.0, 1.03 * travels[-1], 200)
@@ -84,7 +87,7 @@ def _curve_panel(axes: Any, fit: AxisFit) -> None:
     _tidy(axes)
 
 
-def _residual_panel(axes: Any, fit: AxisFit) -> None:
+def _residual_panel(axes: Axes, fit: AxisFit) -> None:
     rotations = [point.rotation_rad for point in fit.points]
     errors = [point.scatter / np.sqrt(point.drives) * _MM for point in fit.points]
     axes.axhline(0.0, color=_BLUE, linewidth=1.2)
@@ -101,7 +104,7 @@ def _residual_panel(axes: Any, fit: AxisFit) -> None:
     _tidy(axes)
 
 
-def _percentage_bars(panel: Any, rows: Sequence[DistanceComparison], highest: float) -> Any:
+def _percentage_bars(panel: Axes, rows: Sequence[DistanceComparison], highest: float) -> Any:
     """Draw the bars on an axis of their own, behind; its zero lies at mid-height so that bars may point down."""
     bars = panel.twinx()
     bars.set_zorder(panel.get_zorder() - 1)
@@ -124,7 +127,7 @@ def _percentage_bars(panel: Any, rows: Sequence[DistanceComparison], highest: fl
     return bars
 
 
-def _distances(panel: Any, rows: Sequence[DistanceComparison]) -> None:
+def _distances(panel: Axes, rows: Sequence[DistanceComparison]) -> None:
     presets = np.array([row.preset_m for row in rows]) * _CM
     step = float(np.diff(presets).min()) if len(presets) > 1 else 1.0
     series = (
@@ -149,7 +152,7 @@ def _distances(panel: Any, rows: Sequence[DistanceComparison]) -> None:
     _tidy(panel)
 
 
-def _tidy(axes: Any) -> None:
+def _tidy(axes: Axes) -> None:
     axes.grid(color="0.9", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top"]].set_visible(False)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+
+from robot_formation.cli.parser import Subparsers
 
 DESCRIPTION = """\
 Print a run's timesteps and totals and draw its pictures (trajectory.png, corrections.png). BAG is a bag's folder, a
@@ -12,7 +13,7 @@ single .mcap file, or the .partial folder of a run that was killed. Lengths are 
 """
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("analyze", help="table, totals and pictures of a run's bag", description=DESCRIPTION)
     parser.add_argument("bag", metavar="BAG", type=Path, help="bag to analyse")

@@ -13,6 +13,7 @@ from robot_formation.cli.calibrate_vision import run_vision
 from robot_formation.cli.calibration_options import build_scenario, free_folder
 from robot_formation.cli.messages import say
 from robot_formation.cli.option_types import option_type, whole_number
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ MOTORS_PICTURE = "motors.png"
 ENCODERS_PICTURE = "encoders.png"
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb and what it calibrates to the command line."""
     parser = subparsers.add_parser(
         "calibrate", help="measure motors, encoders or camera of a scenario's robots", description=DESCRIPTION

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_formation.cli.messages import say
 from robot_formation.cli.option_types import positive_whole
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ sequence, with tracking.
 _FRAME_US = 16_200
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("detect", help="find blocks of taught colours in images", description=DESCRIPTION)
     parser.add_argument(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import Any
+
+from robot_formation.cli.parser import Subparsers
 
 DESCRIPTION = """\
 Summarise a bag, ours or one of 'ros2 bag' (MCAP or SQLite), as 'ros2 bag info' does, without ROS. A bag that was not
@@ -13,7 +14,7 @@ closed is summarised as far as it can be saved.
 """
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("info", help="what is in a bag", description=DESCRIPTION)
     parser.add_argument("bag", metavar="BAG", type=Path, help="bag: a folder, an .mcap or a .db3 file")

@@ -8,8 +8,10 @@ import shutil
 import textwrap
 from typing import Any
 
+from robot_formation.cli.parser import Subparsers
 
-def add_parser(subparsers: Any) -> None:
+
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser(
         "list",

@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeAlias
 
 from robot_formation import exit_codes
 from robot_formation.cli.interrupts import forget_output
@@ -124,3 +124,7 @@ def _path(text: str) -> Path:
     if not text.strip():
         raise argparse.ArgumentTypeError(f"{text!r} is no path")
     return Path(text)
+
+
+Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"
+"""What argparse returns for adding verbs."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from robot_formation import exit_codes
 from robot_formation.cli.messages import say, warn
 from robot_formation.cli.option_types import number
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ pause, q ends.
 """
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("play", help="publish the messages of a bag", description=DESCRIPTION)
     parser.add_argument("bag", metavar="BAG", type=Path, help="bag to play: a folder, an .mcap or a .db3 file")

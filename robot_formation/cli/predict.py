@@ -7,10 +7,11 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation import names
 from robot_formation.cli.option_types import Names
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _LONG = 20_000
 """Rows from which on a predictor takes long enough to be announced."""
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("predict", help="one-step forecasts on a displacement log", description=DESCRIPTION)
     source = parser.add_mutually_exclusive_group(required=True)

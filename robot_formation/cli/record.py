@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_formation.cli.messages import say, warn
 from robot_formation.cli.option_types import positive
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ whose recorder was killed.
 _MIB = 1 << 20
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("record", help="record topics into a bag", description=DESCRIPTION)
     parser.add_argument("topics", metavar="TOPIC", nargs="*", help="topic to record")

@@ -6,8 +6,8 @@ import argparse
 import dataclasses
 import json
 from pathlib import Path
-from typing import Any
 
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 
 DESCRIPTION = """\
@@ -16,7 +16,7 @@ or an .mcap file, also one of another recorder; it stays as it is.
 """
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("recover", help="complete a bag that was cut off", description=DESCRIPTION)
     parser.add_argument("bag", metavar="BAG", type=Path, help="bag that was cut off")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError, shown
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ Run what a bag holds through today's code again and show what would have changed
 _MOST_ROWS = 20
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser(
         "replay", help="recorded data through today's predictor, fine-tuner or detector", description=DESCRIPTION

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
 from robot_formation.cli.option_types import number, whole_number
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ standard error, the analysis to standard output.
 MOST_WARNINGS = 20
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("run", help="run a scenario, record and analyse it", description=DESCRIPTION)
     what = parser.add_mutually_exclusive_group()

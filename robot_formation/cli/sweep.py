@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from robot_formation import exit_codes
 from robot_formation.batch.progress_line import with_progress
 from robot_formation.cli.option_types import Names, whole_number
+from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ FEW_SEEDS = 5
 MOST_SEEDS = 1_000_000
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("sweep", help="compare predictors over many runs", description=DESCRIPTION)
     for name, default, what in (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from robot_formation.cli.messages import say, warn
 from robot_formation.cli.option_types import whole_number, whole_numbers
+from robot_formation.cli.parser import Subparsers
 
 DESCRIPTION = """\
 Teach a colour signature from an image: from a rectangle, as "Set signature" does in PixyMon, or growing from a point,
@@ -17,7 +17,7 @@ file or matches most of the picture is warned of; 'formation detect --mask FILE'
 """
 
 
-def add_parser(subparsers: Any) -> None:
+def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("teach", help="teach a colour signature from an image", description=DESCRIPTION)
     parser.add_argument("image", metavar="IMAGE", type=Path, help="image file, 316 x 208 (others are scaled)")

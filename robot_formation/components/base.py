@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from robot_formation.names import Topic
+from robot_formation.names import Message, Topic
 
-Handler = Callable[[Any], None]
+Handler = Callable[[Message], None]
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,12 @@ class Component:
         self.exit_reason = ""
         self.stamp_ns = 0
         self.wall_clock: Callable[[], float] | None = None
-        self._send: Callable[[Topic, Any], None] = _not_attached
+        self._send: Callable[[Topic, Message], None] = _not_attached
         self._say: Callable[[int, str], None] = lambda level, text: None
         self._warnings = 0
         self._last_warning = ""
 
-    def attach(self, send: Callable[[Topic, Any], None], say: Callable[[int, str], None]) -> None:
+    def attach(self, send: Callable[[Topic, Message], None], say: Callable[[int, str], None]) -> None:
         """Connect: `send(topic, message)` publishes, `say(level, text)` logs (0 info, 1 warning, 2 error)."""
         self._send = send
         self._say = say
@@ -135,5 +135,5 @@ class Component:
         self.exit_code, self.exit_reason = exit_code, reason
 
 
-def _not_attached(topic: Topic, message: Any) -> None:
+def _not_attached(topic: Topic, message: Message) -> None:
     raise RuntimeError(f"nothing is connected to {topic.name}")

@@ -6,7 +6,7 @@ import itertools
 import statistics
 from collections import deque
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import cv2
 
@@ -14,6 +14,7 @@ from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.marker import MarkerKind
+from robot_formation.names import Message
 from robot_formation.vision.aruco_detector import BlockSensor, TagDetector
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
@@ -84,7 +85,7 @@ class BlockDetectorComponent(Component):
             "processing_worst_ms": f"{1e3 * self._worst_s:.3f}" if self._timed else "",
         }
 
-    def _on_image(self, message: Any) -> None:
+    def _on_image(self, message: Message) -> None:
         clock = self.wall_clock
         began = clock() if clock else 0.0
         try:
@@ -108,7 +109,7 @@ class BlockDetectorComponent(Component):
             self._total_s += took_s
             self._worst_s = max(self._worst_s, took_s)
 
-    def _picture(self, message: Any) -> Picture:
+    def _picture(self, message: Message) -> Picture:
         pixels: Picture = conversions.read_image(message)
         height, width = pixels.shape[:2]
         if (width, height) != (WIDTH, HEIGHT) and not self._scaled:

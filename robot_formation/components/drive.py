@@ -10,6 +10,7 @@ from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.drive.curves import calibrated
 from robot_formation.drive.movement_system import Drive, DriveAction, DriveParameters
+from robot_formation.names import Message
 from robot_formation.parameters import ParameterError
 
 # Encoder wheels: half a pulse of 0.233 mm and 0.3 % of 5 cm, rounded up, as one standard deviation each way.
@@ -60,11 +61,11 @@ class DriveComponent(Component):
         """See `Component`."""
         return {"moving": str(self._drive.busy), "calibration": self._calibration}
 
-    def _on_move(self, message: Any) -> None:
+    def _on_move(self, message: Message) -> None:
         self.stamp_ns = max(self.stamp_ns, conversions.stamp_of(message))
         self._act(self._drive.move(conversions.read_move(message)))
 
-    def _on_joint_states(self, message: Any) -> None:
+    def _on_joint_states(self, message: Message) -> None:
         try:
             positions, velocities = conversions.read_joint_states(message)
         except conversions.MessageError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
@@ -12,6 +11,7 @@ from robot_formation.follower import fine_tuning as core
 from robot_formation.follower.alignment_state import State
 from robot_formation.follower.camera_calibration_file import calibrated
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import Message
 
 
 class FineTunerComponent(Component):
@@ -55,17 +55,17 @@ class FineTunerComponent(Component):
         """See `Component`."""
         return {"timestep": str(self._tuner.timestep), "waiting for": self._tuner.phase.name.lower()}
 
-    def _on_neighbour_done(self, message: Any) -> None:
+    def _on_neighbour_done(self, message: Message) -> None:
         self._act(self._tuner.neighbour_done(int(message.data)))
 
-    def _on_prediction(self, message: Any) -> None:
+    def _on_prediction(self, message: Message) -> None:
         known = conversions.has_estimate(message)
         self._act(self._tuner.prediction(conversions.read_displacement(message) if known else None))
 
-    def _on_moved(self, message: Any) -> None:
+    def _on_moved(self, message: Message) -> None:
         self._act(self._tuner.moved(conversions.read_displacement(message), conversions.stamp_of(message)))
 
-    def _on_blocks(self, message: Any) -> None:
+    def _on_blocks(self, message: Message) -> None:
         try:
             blocks = conversions.read_blocks(message)
         except conversions.MessageError as error:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.leader.leader_motion import Leader, LeaderAction, LeaderParameters
+from robot_formation.names import Message
 
 
 class LeaderComponent(Component):
@@ -44,11 +44,11 @@ class LeaderComponent(Component):
         """See `Component`."""
         return {"timestep": str(self._leader.timestep), "waiting for": ", ".join(self._leader.waiting_for)}
 
-    def _on_moved(self, message: Any) -> None:
+    def _on_moved(self, message: Message) -> None:
         self.stamp_ns = conversions.stamp_of(message)
         self._act(self._leader.moved())
 
-    def _on_done(self, follower: str, message: Any) -> None:
+    def _on_done(self, follower: str, message: Message) -> None:
         self._act(self._leader.follower_done(follower, int(message.data)))
 
     def _on_start(self) -> tuple[bool, str]:

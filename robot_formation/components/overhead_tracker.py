@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.node_parameters import OverheadTrackerNodeParameters
 from robot_formation.components.trail import Trail
+from robot_formation.names import Message
 from robot_formation.vision.overhead.dot_tracking import OverheadTracker
 
 
@@ -21,7 +22,7 @@ class OverheadTrackerComponent(Component):
         super().__init__(place)
         self._tracker = OverheadTracker(parameters, parameters.make_surface(), parameters.starts())
         self._path_topics = {robot: names.overhead_path(robot) for robot in parameters.robots}
-        self._trails: dict[str, Trail[Any]] = {robot: Trail() for robot in parameters.robots}
+        self._trails: dict[str, Trail[Message]] = {robot: Trail() for robot in parameters.robots}
         self._pictures = 0
         self._unseen: list[str] = []
 
@@ -45,7 +46,7 @@ class OverheadTrackerComponent(Component):
         """See `Component`."""
         return {"pictures": str(self._pictures), "unseen": ", ".join(self._unseen)}
 
-    def _on_image(self, message: Any) -> None:
+    def _on_image(self, message: Message) -> None:
         try:
             picture = conversions.read_grey_image(message)
         except conversions.MessageError as error:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from robot_formation import conversions, names
+from robot_formation.names import Message
 from robot_formation.surface import Surface
 from robot_formation.world.events import Event, RobotPose
 from robot_formation.world.overhead import OverheadCamera
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.world import World
 
-Send = Callable[[names.Topic, Any], None]
+Send = Callable[[names.Topic, Message], None]
 
 
 class OverheadView:

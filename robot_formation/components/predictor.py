@@ -13,6 +13,7 @@ from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
+from robot_formation.names import Message
 from robot_formation.system.files import MOST_RECORD_BYTES, read_file
 
 _MOST_UNPAIRED = 16  # timesteps of which not all parts have come: in a run, one at a time
@@ -29,7 +30,7 @@ class PredictorComponent(Component):
         self._state_file = Path(state_file) if state_file else None
         self._predictor = self._restored(parameters)
         # By stamp, then topic: (u, v) [m], None where there is no estimate.
-        self._parts: dict[int, dict[names.Topic, Any]] = {}
+        self._parts: dict[int, dict[names.Topic, Message]] = {}
         self._first_commanded_ns: int | None = None
 
     def _restored(self, parameters: PredictorParameters) -> Predictor:
@@ -95,7 +96,7 @@ class PredictorComponent(Component):
         u_m, v_m = (forecast.mean - forecast.command).tolist()
         return (u_m, v_m)
 
-    def _on_part(self, topic: names.Topic, message: Any) -> None:
+    def _on_part(self, topic: names.Topic, message: Message) -> None:
         stamp_ns = conversions.stamp_of(message)
         if topic == names.COMMANDED and self._first_commanded_ns is None:
             self._first_commanded_ns = stamp_ns
@@ -106,7 +107,7 @@ class PredictorComponent(Component):
             self.warn(f"{there} of {oldest_ns} ns came without the rest of the timestep and is forgotten")
         self._answer(stamp_ns)
 
-    def _read(self, topic: names.Topic, message: Any) -> Any:
+    def _read(self, topic: names.Topic, message: Message) -> Any:
         """Read (u, v) [m] of a displacement, None where there is no estimate."""
         if not conversions.has_estimate(message):
             if topic == names.DISPLACEMENT:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.components.overhead_view import OverheadView
 from robot_formation.components.trail import Trail
 from robot_formation.errors import FormationError
+from robot_formation.names import Message
 from robot_formation.surface import Surface
 from robot_formation.world.description import robot_description
 from robot_formation.world.events import Event, Frame, JointStates, LeftPlate, RobotPose
@@ -49,7 +50,7 @@ class WorldComponent(Component):
         self._parameters = parameters
         self._moving: set[str] = set()
         self._numbers = dict.fromkeys(parameters.robots, "")  # of each robot's last command, echoed to its drive
-        self._trails: dict[str, Trail[Any]] = {name: Trail() for name in parameters.robots}
+        self._trails: dict[str, Trail[Message]] = {name: Trail() for name in parameters.robots}
         self._overhead = OverheadView(surface, parameters, parameters.seed)
         self.stamp_ns = start_ns
 
@@ -172,7 +173,7 @@ class WorldComponent(Component):
         self._tell(self._world.step())
         return True, f"{self.stamp_ns / 1e9:.6f} s"
 
-    def _on_command(self, robot: str, message: Any) -> None:
+    def _on_command(self, robot: str, message: Message) -> None:
         try:
             command = conversions.read_joint_command(message)
             self._world.command(robot, command.angles_rad, command.limits_rad_s)
@@ -188,7 +189,7 @@ class WorldComponent(Component):
         self._numbers[robot] = message.header.frame_id
         self._moving.add(robot)
 
-    def _on_request(self, robot: str, message: Any) -> None:
+    def _on_request(self, robot: str, message: Message) -> None:
         try:
             self._world.request_frames(robot, int(message.data))
         except ValueError as error:

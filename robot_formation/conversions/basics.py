@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -14,6 +13,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String, UInt32
 
 from robot_formation.errors import FormationError
+from robot_formation.names import Message
 
 _NS = 1_000_000_000
 
@@ -23,18 +23,19 @@ class MessageError(FormationError):
 
 
 @cache
-def message_class(type_name: str) -> Any:
+def message_class(type_name: str) -> type[Message]:
     """Import the class of 'package/msg/Name'."""
     package, _, name = type_name.split("/")
-    return getattr(importlib.import_module(f"{package}.msg"), name)
+    found: type[Message] = getattr(importlib.import_module(f"{package}.msg"), name)
+    return found
 
 
-def to_cdr(message: Any) -> bytes:
+def to_cdr(message: Message) -> bytes:
     """Serialise a message as it goes over the wire and into a bag."""
     return serialize_message(message)  # type: ignore[no-any-return]
 
 
-def from_cdr(data: bytes, type_name: str) -> Any:
+def from_cdr(data: bytes, type_name: str) -> Message:
     """Deserialise a message of 'package/msg/Name'."""
     return deserialize_message(data, message_class(type_name))
 
@@ -54,7 +55,7 @@ def header(stamp_ns: int, frame: str = "") -> Header:
     return Header(stamp=to_time(stamp_ns), frame_id=frame)
 
 
-def stamp_of(message: Any) -> int:
+def stamp_of(message: Message) -> int:
     """Read a stamped message's time in nanoseconds."""
     return to_ns(message.header.stamp)
 

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
-from typing import Any
 
 from robot_formation import exit_codes, names
 from robot_formation.analysis.from_bag import record_of, run_topics
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.names import Message
 
 OUTCOMES = {exit_codes.DONE: "done", exit_codes.LOST: "lost"}
 
 
 def run_in_memory(
-    scenario: Scenario, make_run: Callable[[Scenario, Callable[[str, Any], None]], InProcessRun] | None = None
+    scenario: Scenario, make_run: Callable[[Scenario, Callable[[str, Message], None]], InProcessRun] | None = None
 ) -> RunRecord:
     """Run a scenario in this process and return its record, as a bag of it would give it.
 
@@ -28,12 +28,12 @@ def run_in_memory(
         FormationError: if a component refuses its parameters, or the run stands still.
     """
     wanted = run_topics(scenario.robots)
-    messages: dict[str, list[Any]] = defaultdict(list)
+    messages: dict[str, list[Message]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
     now_ns = 0
     clock = names.CLOCK_TOPIC.of()
 
-    def listen(topic: str, message: Any) -> None:
+    def listen(topic: str, message: Message) -> None:
         nonlocal now_ns
         if topic == clock:
             now_ns = message.clock.sec * 10**9 + message.clock.nanosec

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from robot_formation import conversions, exit_codes
 from robot_formation.bag.bag_path import PathReservation, check_free
@@ -24,7 +24,7 @@ from robot_formation.components.world import WorldComponent
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
-from robot_formation.names import IMAGE_TYPE, Topic, absolute
+from robot_formation.names import IMAGE_TYPE, Message, Topic, absolute
 
 P = TypeVar("P")
 
@@ -49,11 +49,11 @@ class InProcessRun:
     scenario: Scenario
     recorder: Recorder | None = None
     images: bool = False
-    listen: Callable[[str, Any], None] | None = None
+    listen: Callable[[str, Message], None] | None = None
     warnings: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._queue: deque[tuple[str, Topic, Any]] = deque()
+        self._queue: deque[tuple[str, Topic, Message]] = deque()
         self._handlers: dict[str, list[Handler]] = {}
         self._hosted = [self._host(kind, robot) for kind, robot in self.scenario.hosts()]
         for hosted in self._hosted:
@@ -98,7 +98,7 @@ class InProcessRun:
         component.attach(partial(self._send, namespace), partial(self._say, f"{namespace}/{kind.name}"))
         return _Hosted(component, namespace)
 
-    def _send(self, namespace: str, topic: Topic, message: Any) -> None:
+    def _send(self, namespace: str, topic: Topic, message: Message) -> None:
         self._queue.append((absolute(namespace, topic.name), topic, message))
 
     def _say(self, node: str, level: int, text: str) -> None:

@@ -21,6 +21,7 @@ from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import Message
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose, pose_on_surface
@@ -32,7 +33,7 @@ _ITERATIONS = 8
 class IdealRun(InProcessRun):
     """A run whose prediction moves, from timestep 4 on, are replaced by ideal ones."""
 
-    def __init__(self, scenario: Scenario, listen: Callable[[str, Any], None], *, close: bool) -> None:
+    def __init__(self, scenario: Scenario, listen: Callable[[str, Message], None], *, close: bool) -> None:
         self._poses: dict[str, Pose] = {}
         self._predicting: set[str] = set()
         self._changes: dict[str, Motion] = {}  # what was commanded in this timestep less what was predicted
@@ -49,7 +50,7 @@ class IdealRun(InProcessRun):
             if close and isinstance(hosted.component, PredictorComponent):
                 self._predictors[hosted.namespace] = hosted.component
 
-    def _send(self, namespace: str, topic: names.Topic, message: Any) -> None:
+    def _send(self, namespace: str, topic: names.Topic, message: Message) -> None:
         if (robot := self._odometry.get(names.absolute(namespace, topic.name))) is not None:
             self._poses[robot] = _pose(message.pose.pose)
         elif topic == names.ALIGNMENT and AlignmentState.parse(message.data) is AlignmentState.PREDICT:
@@ -109,7 +110,7 @@ class TargetFace:
         )
 
 
-def _changed(commanded: Any, change: Motion) -> Any:
+def _changed(commanded: Message, change: Motion) -> Any:
     """Tell the predictor of the move that was commanded in place of its own: it learns the robot's bias from it."""
     if not conversions.has_estimate(commanded):
         return commanded
@@ -119,6 +120,6 @@ def _changed(commanded: Any, change: Motion) -> Any:
     return conversions.displacement(changed, commanded.header.frame_id, stamp_ns, (0.0,) * 4)
 
 
-def _pose(message: Any) -> Pose:
+def _pose(message: Message) -> Pose:
     p, q = message.position, message.orientation
     return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))

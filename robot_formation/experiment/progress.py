@@ -7,11 +7,11 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.names import Message
 
 _SAME = 1e-6  # metres and radians
 
@@ -86,7 +86,7 @@ class Progress:
         self._place = Motion(y_m=-formation_distance_m)  # in formation, in the neighbour's frame
         self._followers = [names.follower(n) for n in range(1, followers + 1)]
         self._heard = {robot: _Heard() for robot in (names.LEADER, *self._followers)}
-        self._handlers: dict[str, Callable[[Any], None]] = {}
+        self._handlers: dict[str, Callable[[Message], None]] = {}
         for robot in self._heard:
             self._handlers[f"/{names.ground_truth_pose(robot).name}"] = partial(self._pose, robot)
             self._handlers[names.MOVED.of(robot)] = partial(self._moved, robot)
@@ -104,7 +104,7 @@ class Progress:
         """Whether every timestep has been told."""
         return all(self._heard[robot].told >= self._timesteps for robot in self._followers)
 
-    def listen(self, topic: str, message: Any) -> None:
+    def listen(self, topic: str, message: Message) -> None:
         """Take a message; others than those of `topics` are ignored."""
         handler = self._handlers.get(topic)
         if handler is not None:
@@ -118,16 +118,16 @@ class Progress:
             doing = f" ({heard.state})" if heard.state else ""
             self._say(f"{robot} is in timestep {heard.begun}/{self._timesteps}{doing}  {self._elapsed():6.1f} s")
 
-    def _pose(self, robot: str, message: Any) -> None:
+    def _pose(self, robot: str, message: Message) -> None:
         self._heard[robot].poses.append((conversions.stamp_of(message), conversions.read_pose(message.pose)))
 
-    def _moved(self, robot: str, message: Any) -> None:
+    def _moved(self, robot: str, message: Message) -> None:
         self._heard[robot].moves.append((conversions.stamp_of(message), conversions.read_displacement(message)))
 
-    def _displacement(self, robot: str, message: Any) -> None:
+    def _displacement(self, robot: str, message: Message) -> None:
         self._heard[robot].timesteps.append((conversions.stamp_of(message), conversions.read_displacement(message)))
 
-    def _alignment(self, robot: str, message: Any) -> None:
+    def _alignment(self, robot: str, message: Message) -> None:
         state = AlignmentState.parse(message.data)
         heard = self._heard[robot]
         heard.state = message.data

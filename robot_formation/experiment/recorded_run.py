@@ -16,6 +16,7 @@ from robot_formation.bag.run_details import mapping, node_parameters
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.node_defaults import node_defaults
+from robot_formation.names import Message
 from robot_formation.parameters import from_mapping, specs
 from robot_formation.system.git_commit import git_commit
 
@@ -49,7 +50,7 @@ class Recording:
         """Tell whether there are messages on a robot's topic."""
         return topic.of(robot) in self._bag.topics
 
-    def messages(self, robot: str, topic: names.Topic) -> Iterator[Any]:
+    def messages(self, robot: str, topic: names.Topic) -> Iterator[Message]:
         """Yield the messages of a robot's topic in the order in which they were sent.
 
         Raises:
@@ -65,7 +66,7 @@ class Recording:
                 raise BagError(f"{self._bag.path}: a message on '{name}' can't be decoded: {reason}") from error
             yield decoded
 
-    def any_messages(self, robot: str, topic: names.Topic) -> list[Any]:
+    def any_messages(self, robot: str, topic: names.Topic) -> list[Message]:
         """List the messages of a robot's topic; none if it wasn't recorded.
 
         Raises:
@@ -86,10 +87,10 @@ class Recording:
         return from_mapping(cls, {**known, **changes}, where=kind)
 
 
-def host(kind: str, parameters: Any, robot: str, notes: list[str]) -> tuple[Component, list[tuple[str, Any]]]:
+def host(kind: str, parameters: Any, robot: str, notes: list[str]) -> tuple[Component, list[tuple[str, Message]]]:
     """Make a component of a robot; return it with the list that what it sends (topic name, message) is put in."""
     component: Component = KINDS[kind].component_class()(parameters, Place(robot))
-    sent: list[tuple[str, Any]] = []
+    sent: list[tuple[str, Message]] = []
 
     def say(level: int, text: str) -> None:
         if level > 0 and f"{robot}: {text}" not in notes:
@@ -100,12 +101,12 @@ def host(kind: str, parameters: Any, robot: str, notes: list[str]) -> tuple[Comp
     return component, sent
 
 
-def handlers(component: Component) -> dict[str, Callable[[Any], None]]:
+def handlers(component: Component) -> dict[str, Callable[[Message], None]]:
     """List a component's inputs by topic name."""
     return {entry.topic.name: entry.handler for entry in component.inputs()}
 
 
-def equal(recorded: Sequence[Any], today: Sequence[Any]) -> bool:
+def equal(recorded: Sequence[Message], today: Sequence[Message]) -> bool:
     """Tell whether two sequences of messages have the same values.
 
     Not their serialised form: what lies between its fields is not defined.

@@ -10,6 +10,7 @@ from typing import Any
 from robot_formation import conversions, names
 from robot_formation.experiment.recorded_run import Recording, equal, handlers, host
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import Message
 from robot_formation.vision.pixy2.block import Block
 
 
@@ -103,17 +104,17 @@ def _replay_predictor(recording: Recording, robot: str, parameters: Any) -> Pred
     return PredictionReplay(robot, tuple(rows), equal(recorded, today), tuple(today))
 
 
-def _by_stamp(messages: list[Any]) -> dict[int, Any]:
+def _by_stamp(messages: list[Message]) -> dict[int, Any]:
     return {conversions.stamp_of(message): message for message in messages}
 
 
-def _estimate(message: Any) -> Motion | None:
+def _estimate(message: Message) -> Motion | None:
     if message is None or not conversions.has_estimate(message):
         return None
     return conversions.read_displacement(message)
 
 
-def _ideal(displacement: Any, residual: Any) -> Motion | None:
+def _ideal(displacement: Message, residual: Message) -> Motion | None:
     left = _estimate(residual)
     if left is None:
         return None
@@ -169,6 +170,6 @@ def _replay_detector(recording: Recording, robot: str, parameters: Any) -> Detec
     return DetectionReplay(robot, rows, equal(recorded, today))
 
 
-def _blocks(messages: list[Any]) -> Iterator[tuple[int, tuple[Block, ...]]]:
+def _blocks(messages: list[Message]) -> Iterator[tuple[int, tuple[Block, ...]]]:
     for message in messages:
         yield conversions.stamp_of(message), tuple(conversions.read_blocks(message))

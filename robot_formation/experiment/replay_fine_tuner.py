@@ -19,6 +19,7 @@ from robot_formation import conversions, names
 from robot_formation.experiment.recorded_run import Recording, equal, handlers, host
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
+from robot_formation.names import Message
 
 _SENT = (names.ALIGNMENT, names.MOVE, names.DISPLACEMENT, names.RESIDUAL)
 
@@ -99,10 +100,10 @@ def replay_fine_tuner(recording: Recording, changes: dict[str, Any]) -> list[Fin
 class _Script:
     """What a fine-tuner is given in one timestep."""
 
-    tick: Any
-    moved: deque[Any]
-    blocks: deque[Any]
-    prediction: Any
+    tick: Message
+    moved: deque[Message]
+    blocks: deque[Message]
+    prediction: Message
 
 
 class _Driver:
@@ -118,8 +119,8 @@ class _Driver:
         self._component, self._sent = host("fine_tuner", parameters, robot, self._notes)
         self._take = handlers(self._component)
         self._look_frames = parameters.look.frames
-        self._last_look: deque[Any] = deque(maxlen=self._look_frames)
-        self._repeat: deque[Any] = deque()
+        self._last_look: deque[Message] = deque(maxlen=self._look_frames)
+        self._repeat: deque[Message] = deque()
         self._stamp_ns = 0
         self._beyond = False
 
@@ -136,7 +137,7 @@ class _Driver:
                 del self._notes[notes:]  # of what it did with a look that never was
             if self._component.exit_code is not None:
                 break
-        today: dict[str, list[Any]] = {topic.name: [] for topic in _SENT}
+        today: dict[str, list[Message]] = {topic.name: [] for topic in _SENT}
         for name, message in self._sent:
             today.setdefault(name, []).append(message)
         decided = _split(today)
@@ -196,7 +197,7 @@ def _moves(state: str) -> bool:
     return parsed is not None and parsed.sends_move
 
 
-def _split(sent: dict[str, list[Any]]) -> list[Decisions]:
+def _split(sent: dict[str, list[Message]]) -> list[Decisions]:
     """Tell the timesteps apart: each begins with a state of its own, and moves go with the states that send one."""
     moves = deque(conversions.read_move(message) for message in sent[names.MOVE.name])
     found: list[tuple[list[str], list[Motion]]] = []
@@ -212,7 +213,7 @@ def _split(sent: dict[str, list[Any]]) -> list[Decisions]:
 
 
 def _scripts(
-    recording: Recording, robot: str, timesteps: Sequence[Decisions], recorded: dict[str, list[Any]]
+    recording: Recording, robot: str, timesteps: Sequence[Decisions], recorded: dict[str, list[Message]]
 ) -> list[_Script]:
     """Cut the recorded inputs into timesteps: displacements by the moves that they answer, blocks by their stamps."""
     ticks = list(recording.messages(robot, names.formation_done(names.beacon_neighbour(robot))))
@@ -227,7 +228,7 @@ def _scripts(
             end_ns = conversions.stamp_of(moved[0]) if moved else None
         else:
             end_ns = ends[number - 1] if number <= len(ends) else None
-        own_blocks: deque[Any] = deque()
+        own_blocks: deque[Message] = deque()
         while blocks and (end_ns is None or conversions.stamp_of(blocks[0]) <= end_ns):
             own_blocks.append(blocks.popleft())
         prediction = predictions.popleft() if number and predictions else None

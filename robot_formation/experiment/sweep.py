@@ -23,6 +23,7 @@ from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.oracle import IDEAL, IdealRun
 from robot_formation.koopman.predictors import NAMES
+from robot_formation.names import Message
 from robot_formation.parameters import suggestion
 from robot_formation.surface import SURFACES
 
@@ -146,7 +147,7 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
         SweepError: if the scenario can't be run to an end; the text names the run.
     """
 
-    def make_run(scenario: scenarios.Scenario, listen: Callable[[str, Any], None]) -> InProcessRun:
+    def make_run(scenario: scenarios.Scenario, listen: Callable[[str, Message], None]) -> InProcessRun:
         if task.predictor in IDEAL:
             return IdealRun(scenario, listen, close=task.predictor == "ideal+close")
         return InProcessRun(scenario, listen=listen)

@@ -24,9 +24,10 @@ from rclpy.utilities import try_shutdown
 from std_srvs.srv import SetBool, Trigger
 
 from robot_formation import conversions, exit_codes, names
-from robot_formation.components.base import Component, Place
+from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
+from robot_formation.names import Message
 from robot_formation.network.loopback import use_loopback
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.help import help_text
@@ -144,7 +145,7 @@ class Host:
         self._repetitions = Repetitions()
         self._transform_topics = transform_topics() if kind == "world" else []
         self._transforms = LiveTransforms(node.get_namespace()) if self._transform_topics else None
-        self._publishers: dict[names.Topic, Any] = {}
+        self._publishers: dict[names.Topic, Message] = {}
         self._heard_s = time.monotonic()
         self._connect()
 
@@ -170,7 +171,7 @@ class Host:
         if self._component.patience_s > 0.0:
             node.create_timer(_DIAGNOSTICS_S, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _subscribe(self, topic: names.Topic, handler: Callable[[Any], None]) -> None:
+    def _subscribe(self, topic: names.Topic, handler: Handler) -> None:
         message_class = conversions.message_class(topic.type)
         # Volatile: a node that joins late must not act on what was said before.
         qos = qos_profile(replace(topic.qos, durability="volatile"))
@@ -211,15 +212,15 @@ class Host:
             component.close()
         return component.exit_code or 0
 
-    def _send(self, topic: names.Topic, message: Any) -> None:
+    def _send(self, topic: names.Topic, message: Message) -> None:
         # Transforms first: a recorder that gets the message has found their topics, and makes none of its own.
         if self._transforms is not None:
             for name, cdr in self._transforms.of(topic, message):
                 self._outbox.send(name, cdr)
         self._outbox.send(topic, message)
 
-    def _heard(self, handler: Callable[[Any], None]) -> Callable[[Any], None]:
-        def noted(message: Any) -> None:
+    def _heard(self, handler: Handler) -> Handler:
+        def noted(message: Message) -> None:
             self._heard_s = time.monotonic()
             handler(message)
 
@@ -263,12 +264,12 @@ class Host:
         self._health.publish(conversions.diagnostics(name, health.level, health.text, health.values, stamp_ns))
 
 
-def _trigger(service: Callable[[], tuple[bool, str]], request: Any, response: Any) -> Any:
+def _trigger(service: Callable[[], tuple[bool, str]], request: Message, response: Message) -> Message:
     response.success, response.message = service()
     return response
 
 
-def _switch(switch: Callable[[bool], tuple[bool, str]], request: Any, response: Any) -> Any:
+def _switch(switch: Callable[[bool], tuple[bool, str]], request: Message, response: Message) -> Message:
     response.success, response.message = switch(request.data)
     return response
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.bag.transforms import Transforms
+from robot_formation.names import Message
 
 
 def transform_topics() -> list[names.Topic]:
@@ -32,7 +32,7 @@ class LiveTransforms:
         self._maker = Transforms()
         self._topics = {names.absolute(namespace, topic.name): topic for topic in (names.TF, names.TF_STATIC)}
 
-    def of(self, topic: names.Topic, message: Any) -> Iterator[tuple[names.Topic, bytes]]:
+    def of(self, topic: names.Topic, message: Message) -> Iterator[tuple[names.Topic, bytes]]:
         """Yield topics with serialised messages; nothing for a message that says of no frame where it is.
 
         Args:

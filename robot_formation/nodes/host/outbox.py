@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from robot_formation.names import IMAGE_TYPE, PROGRESS, Topic, absolute
+from robot_formation.names import IMAGE_TYPE, PROGRESS, Message, Topic, absolute
 
 _STAND_IN_S = 5.0
 
@@ -41,7 +40,7 @@ class Outbox:
         self._warn = warn
         self._publishers: dict[Topic, Publisher] = {}
         self._ready: set[Topic] = set()
-        self._waiting: deque[tuple[Topic, Any]] = deque()
+        self._waiting: deque[tuple[Topic, Message]] = deque()
         self._since: float | None = None
 
     def add(self, topic: Topic, publisher: Publisher) -> None:
@@ -56,7 +55,7 @@ class Outbox:
         """Whether messages are held back."""
         return bool(self._waiting)
 
-    def send(self, topic: Topic, message: Any) -> None:
+    def send(self, topic: Topic, message: Message) -> None:
         """Publish now, or as soon as everything sent before is out and the listeners are there."""
         self._waiting.append((topic, message))
         self.flush()

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import Executor
@@ -23,6 +23,7 @@ from robot_formation.bag.playback import Excerpt, Playhead, Prefetch, ScheduleEr
 from robot_formation.bag.reader import Bag, read_bag
 from robot_formation.bag.selection import Selection
 from robot_formation.bag.source import RawMessage
+from robot_formation.names import Message
 from robot_formation.nodes.host.component_node import qos_profile
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.ros_parameters import ParameterNode, declare, take_changes
@@ -282,12 +283,12 @@ class PlayerNode:
     def _send(self, message: RawMessage) -> None:
         self._outputs[message.topic].send(message.cdr, partial(self._executor.spin_once, 0.001))
 
-    def _on_pause(self, request: Any, response: Any) -> Any:
+    def _on_pause(self, request: Message, response: Message) -> Message:
         self._head.pause(request.data, time.monotonic())
         response.success, response.message = True, "paused" if request.data else "playing"
         return response
 
-    def _on_step(self, request: Any, response: Any) -> Any:
+    def _on_step(self, request: Message, response: Message) -> Message:
         response.success = self._head.paused
         response.message = "stepping" if self._head.paused else "the player runs: call ~/pause with true first"
         self._steps += self._head.paused

@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import TracebackType
-from typing import Any
 
 import rclpy
 from rclpy.context import Context
@@ -17,6 +16,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from robot_formation import conversions, names
+from robot_formation.names import Message
 from robot_formation.network.loopback import BEYOND, PROFILES, RANGE
 from robot_formation.nodes.host.component_node import qos_profile
 from robot_formation.nodes.host.executor import make_executor
@@ -61,7 +61,9 @@ class Monitor:
         reports: how often each node, by its full name, has reported on /diagnostics.
     """
 
-    def __init__(self, environment: Mapping[str, str], topics: list[str], listen: Callable[[str, Any], None]) -> None:
+    def __init__(
+        self, environment: Mapping[str, str], topics: list[str], listen: Callable[[str, Message], None]
+    ) -> None:
         """Join the graph.
 
         Args:
@@ -123,10 +125,10 @@ class Monitor:
         del self._executor, self._node, self._context
         gc.collect()
 
-    def _take_report(self, message: Any) -> None:
+    def _take_report(self, message: Message) -> None:
         for status in message.status:
             self.reports[status.name] += 1
 
-    def _take(self, topic: str, message: Any) -> None:
+    def _take(self, topic: str, message: Message) -> None:
         self.messages += 1
         self._listen(topic, message)

@@ -6,13 +6,14 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rclpy.executors import Executor
 
 from robot_formation import conversions, exit_codes
 from robot_formation.experiment.progress import Progress
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+from robot_formation.names import Message
 from robot_formation.nodes.host.component_node import qos_profile
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.ros_parameters import ParameterNode, declare
@@ -84,7 +85,7 @@ class Executable:
             if quiet == _QUIET_ROUNDS:
                 return
 
-    def _take(self, topic: str, message: Any) -> None:
+    def _take(self, topic: str, message: Message) -> None:
         self._messages += 1
         self._progress.listen(topic, message)
 
