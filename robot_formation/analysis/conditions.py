@@ -10,7 +10,7 @@ from robot_formation.bag.run_details import node_parameters, whole_number
 _SEED_DIGITS = 19  # of 2^63 - 1
 
 
-def conditions(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def conditions(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, object]:
     """List the conditions of a run by name; None where unknown, or where no run has such a value.
 
     Args:
@@ -27,7 +27,7 @@ def conditions(parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     }
 
 
-def conditions_text(found: Mapping[str, Any]) -> str:
+def conditions_text(found: Mapping[str, object]) -> str:
     """Say the conditions in a line; what is unknown is left out, and so is what nearly every run has."""
     said = []
     if found.get("mode"):
@@ -43,7 +43,7 @@ def conditions_text(found: Mapping[str, Any]) -> str:
     return ", ".join(said)
 
 
-def _word(found: Any) -> str | None:
+def _word(found: object) -> str | None:
     """Return a choice's name; None if it can be none, so that nothing else is printed."""
     return found if isinstance(found, str) and found.isascii() and found.isidentifier() else None
 

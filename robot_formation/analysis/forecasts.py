@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +36,7 @@ class OneStepForecasts:
     covariances_m2: NDArray[np.float64]
     error_m: Mapping[str, float | None]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return what the command line's JSON says of a predictor."""
         return {
             "forecast": _rows(self.means_m),
@@ -120,7 +119,7 @@ def error_table(log: DisplacementLog, forecasts: Sequence[OneStepForecasts]) -> 
     return "\n".join([head, "", *lines])
 
 
-def _rows(values: NDArray[np.float64]) -> list[Any]:
+def _rows(values: NDArray[np.float64]) -> list[object]:
     """Turn an array (n, ...) into a list of n, None where there is NaN."""
     return [None if np.isnan(row).any() else row.tolist() for row in values]
 

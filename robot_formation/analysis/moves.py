@@ -18,7 +18,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
-from typing import Any
 
 from robot_formation.analysis.run_record import FollowerRecord
 from robot_formation.follower.alignment_state import AlignmentState
@@ -98,7 +97,7 @@ def losses(follower: FollowerRecord) -> tuple[Loss, ...]:
     return tuple(found)
 
 
-def move_totals(timesteps: Sequence[Moves], movements: Sequence[int], follower: FollowerRecord) -> dict[str, Any]:
+def move_totals(timesteps: Sequence[Moves], movements: Sequence[int], follower: FollowerRecord) -> dict[str, object]:
     """Sum up a follower's moves and losses as the command line's JSON has them.
 
     Args:

@@ -26,7 +26,7 @@ def new_figure(width: float, height: float) -> Any:
     return figure
 
 
-def legend_below(figure: Figure, handles: Sequence[Any], columns: int, **style: Any) -> None:
+def legend_below(figure: Figure, handles: Sequence[object], columns: int, **style: object) -> None:
     """Write a legend, centred, below all panels, and let the layout keep its room free.
 
     Not by the place "outside lower center", which matplotlib has from 3.7 on only.

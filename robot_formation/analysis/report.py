@@ -26,7 +26,7 @@ _WIDTHS = (3, 13, 13, 13, 13, 6, 10, 8)
 _NONE = "-"
 
 
-def to_json(analysis: RunAnalysis, said: Mapping[str, Any] | None = None) -> str:
+def to_json(analysis: RunAnalysis, said: Mapping[str, object] | None = None) -> str:
     """Return the analysis in the command line's JSON shape, without NaN; `said` holds further entries."""
     return json.dumps({**analysis.to_json(), **(said or {})}, indent=2, allow_nan=False)
 
@@ -147,7 +147,7 @@ def _correction(values: dict[str, Any]) -> str:
     return f"{both} cm (u {u}, v {v}), turns {_scaled(values['correction_turn_rad'], math.degrees(1.0))} deg"
 
 
-def _movements(values: dict[str, Any]) -> str:
+def _movements(values: dict[str, object]) -> str:
     per_timestep = values["movements_per_timestep"]
     return f"{values['movements']}{'' if per_timestep is None else f' ({per_timestep:.2f} per timestep)'}"
 

@@ -52,10 +52,10 @@ def definition(type_name: str) -> Definition:
     return Definition(type_name, "ros2msg", text, store.hash_rihs01(type_name))
 
 
-def _installed_types(type_name: str) -> dict[str, Any]:
+def _installed_types(type_name: str) -> dict[str, object]:
     """Parse the .msg file of a type and those of the types that it is made of, as far as they are installed."""
     known = jazzy_typestore().fielddefs
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     wanted = [type_name]
     while wanted:
         name = wanted.pop()

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from typing import Any
 
 import zstandard
 
@@ -148,7 +147,7 @@ def _metadata(folder: Path) -> FolderMetadata:
     return metadata
 
 
-def _mode(said: Any) -> str:
+def _mode(said: object) -> str:
     mode = str(said or "").lower()
     return "" if mode == "none" else mode
 

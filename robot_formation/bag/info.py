@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from robot_formation.bag.folder import storage_files
 from robot_formation.bag.formation_bag import formation_namespaces
@@ -67,7 +66,7 @@ class BagInfo:
             return False
         return True if "scenario" in self.details else None
 
-    def to_mapping(self) -> dict[str, Any]:
+    def to_mapping(self) -> dict[str, object]:
         """Return what `--json` prints."""
         return {
             "bag": str(self.path),
@@ -142,7 +141,7 @@ def info_text(info: BagInfo) -> str:
     return "\n".join(lines)
 
 
-def _topic(topic: TopicSummary) -> dict[str, Any]:
+def _topic(topic: TopicSummary) -> dict[str, object]:
     return {
         "name": topic.name,
         "type": topic.type_name,

@@ -41,7 +41,7 @@ _KINDS: dict[int, Any] = {
 _OTHERS = 0x80  # from here on records are those of applications, and skipped
 
 
-def records(stream: BinaryIO, at: int) -> Iterator[Any]:
+def records(stream: BinaryIO, at: int) -> Iterator[object]:
     """Yield the records from a place in the file on, chunks as they are; the file stands behind each.
 
     Ends with the file.

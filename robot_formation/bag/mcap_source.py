@@ -188,7 +188,7 @@ def has_index(path: Path) -> bool:
 
 def _summary(stream: BinaryIO) -> dict[type, list[Any]]:
     """Read a file's summary: records by kind."""
-    found: dict[type, list[Any]] = defaultdict(list)
+    found: dict[type, list[object]] = defaultdict(list)
     place = summary_place(stream)
     for record in records(stream, place) if place else ():
         if isinstance(record, Footer):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import yaml
 
@@ -62,7 +62,7 @@ def merged(files: Sequence[FileLike]) -> list[TopicSummary]:
     return list(found.values())
 
 
-def bag_information(files: Sequence[tuple[str, int, Span]], topics: Sequence[TopicSummary]) -> dict[str, Any]:
+def bag_information(files: Sequence[tuple[str, int, Span]], topics: Sequence[TopicSummary]) -> dict[str, object]:
     """Build `rosbag2_bagfile_information` of a bag, keys in rosbag2's order.
 
     Args:
@@ -90,14 +90,14 @@ def bag_information(files: Sequence[tuple[str, int, Span]], topics: Sequence[Top
     }
 
 
-def _times(span: Span) -> dict[str, Any]:
+def _times(span: Span) -> dict[str, object]:
     return {
         "duration": {"nanoseconds": span.duration_ns},
         "starting_time": {"nanoseconds_since_epoch": span.first_ns},
     }
 
 
-def _file(name: str, message_count: int, span: Span) -> dict[str, Any]:
+def _file(name: str, message_count: int, span: Span) -> dict[str, object]:
     times = _times(span)
     # In the list of files rosbag2 has the two the other way round.
     return {
@@ -108,12 +108,12 @@ def _file(name: str, message_count: int, span: Span) -> dict[str, Any]:
     }
 
 
-def to_yaml(value: Any) -> str:
+def to_yaml(value: object) -> str:
     """Write YAML in the given key order."""
     return yaml.safe_dump(value, sort_keys=False, default_flow_style=False)
 
 
-def _topic(topic: TopicSummary) -> dict[str, Any]:
+def _topic(topic: TopicSummary) -> dict[str, object]:
     return {
         "topic_metadata": {
             "name": topic.name,

@@ -24,7 +24,7 @@ _CHOICES = {
 }
 
 # rosbag2 wrote the policies as these numbers (rmw's enumerations) before metadata version 9.
-_NUMBERED: dict[str, dict[Any, str]] = {
+_NUMBERED: dict[str, dict[object, str]] = {
     "history": {0: "system_default", 1: "keep_last", 2: "keep_all", 3: "unknown"},
     "reliability": {0: "system_default", 1: "reliable", 2: "best_effort", 3: "unknown", 4: "best_available"},
     "durability": {0: "system_default", 1: "transient_local", 2: "volatile", 3: "unknown", 4: "best_available"},
@@ -62,7 +62,7 @@ class TopicQos:
         """Return what a publisher of one of the project's topics offers."""
         return cls(qos.history, qos.depth, qos.reliability, qos.durability)
 
-    def to_mapping(self) -> dict[str, Any]:
+    def to_mapping(self) -> dict[str, object]:
         """Return rosbag2's mapping of one offered profile, keys in rosbag2's order."""
         return {
             "history": self.history,

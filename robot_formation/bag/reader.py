@@ -33,7 +33,7 @@ class BagMessage(NamedTuple):
     topic: str
     type_name: str
     stamp_ns: int
-    message: Any
+    message: object
 
 
 class Bag:
@@ -121,7 +121,7 @@ class Bag:
                     f"{self.path}: '{topic}' is a {type_name} with other fields than in ROS 2 Jazzy; it can't be used"
                 )
 
-    def _hash(self, type_name: str) -> Any:
+    def _hash(self, type_name: str) -> object:
         try:
             return self._typestore.hash_rihs01(type_name)
         except Exception:  # rosbags' type store has no common error

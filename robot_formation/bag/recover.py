@@ -222,7 +222,7 @@ def _profiles(channel: Channel) -> tuple[TopicQos, ...]:
         return ()
 
 
-def _readable_records(stream: Any) -> Iterator[Any]:
+def _readable_records(stream: Any) -> Iterator[object]:
     """Yield a file's records, whole ones only, up to the end of its data section or of what is there."""
     try:
         if stream.read(len(MAGIC)) != MAGIC:

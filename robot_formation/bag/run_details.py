@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 
-def value(text: str) -> Any:
+def value(text: str) -> object:
     """Read a text that is JSON; one that isn't, is nested too deep or holds NaN or infinities, stays a text."""
     try:
         return json.loads(text, parse_float=_finite, parse_constant=_finite)

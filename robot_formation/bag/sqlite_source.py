@@ -82,7 +82,7 @@ class SqliteSource(Source):
         self._reader.close()
 
 
-def _check(value: Any, kind: type, what: str) -> Any:
+def _check(value: object, kind: type, what: str) -> Any:
     """Refuse what SQLite lets into any column."""
     if not isinstance(value, kind):
         raise BagError(f"{what} in the database is {shown(value)}")

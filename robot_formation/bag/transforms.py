@@ -39,7 +39,7 @@ class Transforms:
 
     def __init__(self) -> None:
         self._taken: list[tuple[str, str, str, bytes, int]] = []
-        self._static: defaultdict[str, dict[str, Any]] = defaultdict(dict)  # by namespace and child frame
+        self._static: defaultdict[str, dict[str, object]] = defaultdict(dict)  # by namespace and child frame
 
     def take(self, topic: str, type_name: str, cdr: bytes, stamp_ns: int) -> None:
         """Keep a message if it says where a frame is."""
@@ -137,11 +137,11 @@ def _vector(text: str) -> Vector:
     return (x, y, z)
 
 
-def _transform(header: Message, child: str, transform: Message) -> Any:
+def _transform(header: Message, child: str, transform: Message) -> object:
     return jazzy_typestore().types["geometry_msgs/msg/TransformStamped"](header, child, transform)
 
 
-def _message(topic: names.Topic, transforms: list[Any], stamp_ns: int) -> TransformMessage:
+def _message(topic: names.Topic, transforms: list[object], stamp_ns: int) -> TransformMessage:
     store = jazzy_typestore()
     message = store.types[topic.type](transforms)
     return TransformMessage(topic, bytes(store.serialize_cdr(message, topic.type)), stamp_ns)

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from robot_formation.bag.bag_path import PARTIAL_SUFFIX, check_free, recover_hint
 from robot_formation.bag.definitions import Definition, definition
@@ -265,7 +264,7 @@ class BagWriter:
         self._file.finish()
         self._finished.append(self._file)
 
-    def _information(self, files: Sequence[McapFile]) -> dict[str, Any]:
+    def _information(self, files: Sequence[McapFile]) -> dict[str, object]:
         return bag_information([(file.path.name, file.message_count, file.span) for file in files], merged(files))
 
     def _check_open(self) -> None:

@@ -6,14 +6,14 @@ import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, TypeVar
+from typing import TypeVar
 
 T = TypeVar("T")
 _MANAGER = "ExecutorManagerThread"
 _ENDS_S = 5.0
 
 
-def run_parallel(function: Callable[..., T], arguments: Iterable[tuple[Any, ...]], jobs: int) -> Iterator[T]:
+def run_parallel(function: Callable[..., T], arguments: Iterable[tuple[object, ...]], jobs: int) -> Iterator[T]:
     """Call a function with each tuple of arguments in worker processes; yield results in the same order.
 
     Raises:
@@ -30,7 +30,7 @@ def run_parallel(function: Callable[..., T], arguments: Iterable[tuple[Any, ...]
         yield from results
 
 
-def _uninterrupted(in_worker: bool, function: Callable[..., T], arguments: tuple[Any, ...]) -> T:
+def _uninterrupted(in_worker: bool, function: Callable[..., T], arguments: tuple[object, ...]) -> T:
     """Call a function; in a worker that the pool has started later, interrupts are for its parent too."""
     if in_worker:
         signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -72,11 +72,11 @@ class ResumableTable(Generic[Row]):
         with self.path.open("a", newline="", encoding="utf-8") as file:
             csv.writer(file).writerows(map(self._cells, rows))
 
-    def _kinds(self) -> dict[str, Any]:
+    def _kinds(self) -> dict[str, object]:
         """Types by column."""
         return get_type_hints(self.row)
 
-    def _cells(self, row: Row) -> list[Any]:
+    def _cells(self, row: Row) -> list[object]:
         values = (getattr(row, name) for name in self._kinds())
         return ["" if value is None else value for value in values]
 
@@ -96,7 +96,7 @@ def read_record(path: Path) -> dict[str, Any]:
     return found
 
 
-def write_record(path: Path, record: Mapping[str, Any]) -> None:
+def write_record(path: Path, record: Mapping[str, object]) -> None:
     """Write what a table's rows depend on; the file is put in place at once."""
     _replaced(path).write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
     _replaced(path).replace(path)
@@ -107,7 +107,7 @@ def _replaced(path: Path) -> Path:
     return path.with_suffix(".partial")
 
 
-def _value(kind: Any, text: str) -> Any:
+def _value(kind: object, text: str) -> object:
     """Read a cell of type str, int, float, or these or None.
 
     Raises:

@@ -138,7 +138,7 @@ def _fill(axes: Axes, u_m: float, v_m: float, size: float, kinds: Collection[Kin
     _tile(axes, u_m, v_m, size, facecolor="none", edgecolor="white")
 
 
-def _tile(axes: Axes, u_m: float, v_m: float, size: float, **style: Any) -> None:
+def _tile(axes: Axes, u_m: float, v_m: float, size: float, **style: object) -> None:
     style = {"edgecolor": "white", "linewidth": 0.6, **style}
     axes.add_patch(_rectangle(u_m * _CM, v_m * _CM, size, size, **style))
 

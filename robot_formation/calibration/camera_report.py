@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from robot_formation.calibration.camera_edge_bias import EdgeBias
 from robot_formation.calibration.camera_fit import (
@@ -117,7 +116,7 @@ def vision_text(result: VisionResult) -> str:
     return "\n".join(lines)
 
 
-def vision_json(result: VisionResult) -> dict[str, Any]:
+def vision_json(result: VisionResult) -> dict[str, object]:
     """Return poses, areas by position, curves, and the fine-tuner's values with their standard errors."""
     fit = result.fit
     distances, compared = result.distances()

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor
 from pathlib import Path
-from typing import Any
 
 from robot_formation import conversions, names
 from robot_formation.bag.message_recorder import Recorder
@@ -96,7 +95,7 @@ def _write_descriptions(recorder: Recorder, conditions: Conditions) -> None:
         _record(recorder, "", names.robot_description(robot), conversions.string(text))
 
 
-def _odometry(pose: Pose, robot: str, stamp_ns: int) -> Any:
+def _odometry(pose: Pose, robot: str, stamp_ns: int) -> object:
     rest = (0.0, 0.0, 0.0)
     return conversions.body_odometry(
         pose.position,

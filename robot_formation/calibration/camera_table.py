@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import Any
 
 from robot_formation.batch.resumable_table import ResumableTable, read_record, write_record
 from robot_formation.calibration.camera_grid import Position
@@ -56,7 +55,7 @@ class VisionTable:
         samples: by position, what is in the table; whole positions only.
     """
 
-    def __init__(self, folder: Path, record: Mapping[str, Any], positions: Sequence[Position]) -> None:
+    def __init__(self, folder: Path, record: Mapping[str, object], positions: Sequence[Position]) -> None:
         """Open a folder's table: a new one, or that of an earlier calibration under the same conditions.
 
         Raises:
@@ -123,7 +122,7 @@ def _rows(samples: Iterable[CameraSample]) -> Iterator[TableRow]:
             yield TableRow(s.u_m, s.v_m, s.clockwise_deg, int(s.attainable), s.frames, *cells)
 
 
-def _require_same(recorded: Path, record: Mapping[str, Any]) -> None:
+def _require_same(recorded: Path, record: Mapping[str, object]) -> None:
     try:
         earlier = read_record(recorded)
     except ValueError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from robot_formation.calibration.encoder_comparison import DistanceComparison, Spread
 from robot_formation.calibration.motor_fit import AxisFit
@@ -37,7 +36,7 @@ def motors_text(fits: Fits) -> str:
     return "\n".join(lines)
 
 
-def motors_json(fits: Fits) -> dict[str, Any]:
+def motors_json(fits: Fits) -> dict[str, object]:
     """Return the fits by robot and axis; travels in `unit`, wheel rotations in rad."""
     return {robot: {axis: _axis_json(fit) for axis, fit in axes.items()} for robot, axes in fits.items()}
 
@@ -58,7 +57,7 @@ def encoders_text(comparisons: Sequence[DistanceComparison]) -> str:
     return "\n".join(lines)
 
 
-def encoders_json(comparisons: Sequence[DistanceComparison]) -> list[dict[str, Any]]:
+def encoders_json(comparisons: Sequence[DistanceComparison]) -> list[dict[str, object]]:
     """Return one entry per axis and preset distance."""
     return [
         {
@@ -74,7 +73,7 @@ def encoders_json(comparisons: Sequence[DistanceComparison]) -> list[dict[str, A
     ]
 
 
-def _axis_json(fit: AxisFit) -> dict[str, Any]:
+def _axis_json(fit: AxisFit) -> dict[str, object]:
     return {
         "unit": unit_of(fit.axis),
         "curve": list(fit.curve),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation.cli.calibrate_vision import DESCRIPTION as VISION_DESCRIPTION
 from robot_formation.cli.calibrate_vision import add_options as add_vision_options
@@ -161,7 +161,7 @@ def make_rig(args: argparse.Namespace, scenario: Scenario) -> CalibrationRig:
     return CalibrationRig(scenario.world.make_surface(), scenario.world, scenario.setup.seed, args.reference_noise)
 
 
-def _conditions(args: argparse.Namespace, scenario: Scenario) -> dict[str, Any]:
+def _conditions(args: argparse.Namespace, scenario: Scenario) -> dict[str, object]:
     return {
         "scenario": scenario.setup.name,
         "seed": scenario.setup.seed,

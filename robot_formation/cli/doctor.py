@@ -33,7 +33,7 @@ _MODULES = {
 _MESSAGES = ("sensor_msgs.msg", "geometry_msgs.msg", "nav_msgs.msg", "std_srvs.srv")
 _VARIABLES = ("ROS_DISTRO", "AMENT_PREFIX_PATH", "RMW_IMPLEMENTATION", "ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE")
 
-Report = dict[str, dict[str, Any]]
+Report = dict[str, dict[str, object]]
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
 def collect(missing: list[str]) -> Report:
     """Gather the report, by section; what a run needs and is not there is appended to `missing`."""
-    sections: dict[str, Callable[[list[str]], dict[str, Any]]] = {
+    sections: dict[str, Callable[[list[str]], dict[str, object]]] = {
         "project": _project,
         "system": _system,
         "ros": _ros,
@@ -85,7 +85,7 @@ def collect(missing: list[str]) -> Report:
     return report
 
 
-def _project(missing: list[str]) -> dict[str, Any]:
+def _project(missing: list[str]) -> dict[str, object]:
     try:
         config: str | None = str(paths.config_dir())
     except ValueError as error:
@@ -100,7 +100,7 @@ def _project(missing: list[str]) -> dict[str, Any]:
     }
 
 
-def _system(missing: list[str]) -> dict[str, Any]:
+def _system(missing: list[str]) -> dict[str, object]:
     import platform
 
     try:
@@ -116,7 +116,7 @@ def _system(missing: list[str]) -> dict[str, Any]:
     }
 
 
-def _ros(missing: list[str]) -> dict[str, Any]:
+def _ros(missing: list[str]) -> dict[str, object]:
     from importlib import metadata
 
     wheels = sorted(
@@ -124,7 +124,7 @@ def _ros(missing: list[str]) -> dict[str, Any]:
         for distribution in metadata.distributions()
         if distribution.name.startswith("ros-jazzy-")
     )
-    report: dict[str, Any] = {"wheels": ", ".join(wheels) or None}
+    report: dict[str, object] = {"wheels": ", ".join(wheels) or None}
     report.update({name: os.environ.get(name) for name in _VARIABLES})
     report["rclpy"] = report["rmw"] = None
     try:
@@ -144,8 +144,8 @@ def _ros(missing: list[str]) -> dict[str, Any]:
     return report
 
 
-def _modules(missing: list[str]) -> dict[str, Any]:
-    report: dict[str, Any] = {}
+def _modules(missing: list[str]) -> dict[str, object]:
+    report: dict[str, object] = {}
     for name, distributions in _MODULES.items():
         module = _import(name, missing)
         report[name] = None if module is None else _version(module, distributions)
@@ -154,7 +154,7 @@ def _modules(missing: list[str]) -> dict[str, Any]:
     return report
 
 
-def _domain(missing: list[str]) -> dict[str, Any]:
+def _domain(missing: list[str]) -> dict[str, object]:
     from robot_formation.network.ros_domain import DomainError, free_domain
 
     try:
@@ -164,7 +164,7 @@ def _domain(missing: list[str]) -> dict[str, Any]:
         return {"next_free": None}
 
 
-def _shared_memory(missing: list[str]) -> dict[str, Any]:
+def _shared_memory(missing: list[str]) -> dict[str, object]:
     from robot_formation.network.shared_memory import fast_dds_files, find_orphans
 
     try:
@@ -193,7 +193,7 @@ def _import(name: str, missing: list[str]) -> Any:
         return None
 
 
-def _version(module: Any, distributions: tuple[str, ...]) -> str:
+def _version(module: object, distributions: tuple[str, ...]) -> str:
     from importlib import metadata
 
     for distribution in distributions:
