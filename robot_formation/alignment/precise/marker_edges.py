@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from robot_formation.alignment.observation import MARGIN_PX, FaceBox, bounding_boxes
 from robot_formation.parameters import ParameterError, parameter
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH
 

@@ -33,7 +33,7 @@ from robot_formation.alignment.precise.marker_projection import (
 from robot_formation.alignment.precise.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 # All chosen; docs/alignment.md ("Constants") says how far runs depend on them.

@@ -10,7 +10,7 @@ import numpy as np
 
 from robot_formation.alignment.precise.marker_edges import Edge, EdgeParameters, View, hidden, sliver
 from robot_formation.alignment.precise.marker_projection import SIZE, YAW, MarkerModel, Matrix, Vector, X, Y
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.picture import WIDTH
 
 # All chosen; docs/alignment.md ("Constants") says how far runs depend on them.

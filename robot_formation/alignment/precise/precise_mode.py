@@ -24,7 +24,7 @@ from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, 
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 
 # All chosen, with bench/alignment.py; docs/alignment.md ("Constants") says how far runs depend on them.
 _IMPLAUSIBLE_NIS = 6.0

@@ -22,7 +22,7 @@ from robot_formation.alignment.precise.marker_projection import (
 )
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 FORMATION = Motion(y_m=-FORMATION_DISTANCE_M)
