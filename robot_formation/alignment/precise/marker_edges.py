@@ -12,7 +12,7 @@ from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH
 
-# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
+# All chosen.
 _CUT = 6.0
 """Factor on the scatter of the rows of a face that the picture cuts off: the hidden part may reach higher."""
 _SPLIT_PX = 12.0
