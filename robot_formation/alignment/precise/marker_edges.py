@@ -119,6 +119,11 @@ class EdgeParameters:
                     "have one value more than it"
                 )
 
+    @property
+    def height_bias_px(self) -> float:
+        """What the detector reports more than a block's true height, px."""
+        return self.target_bottom_px - self.target_top_px
+
     def clear(self, target: FaceBox | None) -> bool:
         """Whether the marker is near and frontal enough for the finer values of its outer edges."""
         if target is None or target.height < self.clear_height_px:
