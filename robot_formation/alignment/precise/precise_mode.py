@@ -26,7 +26,7 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
 from robot_formation.vision.marker import Face
 
-# All chosen, with bench/alignment.py; docs/alignment.md ("Constants") says how far runs depend on them.
+# All chosen.
 _IMPLAUSIBLE_NIS = 6.0
 """NIS of a look from which on it is taken not to show the whole marker."""
 _VIEWPOINTS_M = (0.135, -0.135, 0.135, -0.12, 0.12)
