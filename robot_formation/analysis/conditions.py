@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from robot_formation.bag.run_details import node_parameters, whole_number
+from robot_formation.json_values import JsonObject
 
 _SEED_DIGITS = 19  # of 2^63 - 1
 
@@ -48,7 +48,7 @@ def _word(found: object) -> str | None:
     return found if isinstance(found, str) and found.isascii() and found.isidentifier() else None
 
 
-def run_facts(details: Mapping[str, str], *, in_process: bool | None = None) -> dict[str, Any]:
+def run_facts(details: Mapping[str, str], *, in_process: bool | None = None) -> JsonObject:
     """Return which run it was, as the command line's JSON has it: seed, predictor, surface, conditions.
 
     Args:

@@ -8,7 +8,6 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -193,7 +192,7 @@ def _stamped(messages: Sequence[Message]) -> tuple[Stamped, ...]:
     )
 
 
-def _covariance_uv(covariance: Any) -> tuple[float, float, float]:
+def _covariance_uv(covariance: Message) -> tuple[float, float, float]:
     """Turn a message's covariance, whose first two axes are x = v and y = -u, into those of (u, u), (u, v), (v, v)."""
     return (float(covariance[7]), -float(covariance[1]), float(covariance[0]))
 
@@ -203,11 +202,11 @@ def _stamp_ns(message: Message) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
-def _motion(pose: Any) -> Motion:
+def _motion(pose: Message) -> Motion:
     return Motion(float(pose.position.x), float(pose.position.y), _yaw(pose.orientation))
 
 
-def _yaw(quaternion: Any) -> float:
+def _yaw(quaternion: Message) -> float:
     return yaw_rad((quaternion.x, quaternion.y, quaternion.z, quaternion.w))
 
 
@@ -257,11 +256,11 @@ def _overhead(
     return tracks
 
 
-def _place(point: Any) -> tuple[float, float, float]:
+def _place(point: Message) -> tuple[float, float, float]:
     return (float(point.x), float(point.y), float(point.z))
 
 
-def _dot(pose: Any, height_m: float) -> tuple[float, float, float]:
+def _dot(pose: Message, height_m: float) -> tuple[float, float, float]:
     """Place of a robot's dot, which is on the z axis of its base_link."""
     q = pose.orientation
     x, y, z = _place(pose.position)
@@ -269,7 +268,7 @@ def _dot(pose: Any, height_m: float) -> tuple[float, float, float]:
     return (x + height_m * up_x, y + height_m * up_y, z + height_m * (1.0 - 2.0 * (q.x * q.x + q.y * q.y)))
 
 
-def _ground(marker: Any) -> Ground | None:
+def _ground(marker: Message) -> Ground | None:
     """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices."""
     if marker.type != _TRIANGLE_LIST or len(marker.points) < 3:
         return None

@@ -27,7 +27,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +37,7 @@ from robot_formation.analysis.quantiles import ELLIPSE_90
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord
 from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
+from robot_formation.json_values import JsonObject
 from robot_formation.names import beacon_neighbour
 
 
@@ -98,7 +98,7 @@ class FollowerAnalysis:
     lost: bool
     timesteps: tuple[Timestep, ...]
     unfinished: Corrections | None
-    totals: dict[str, Any]
+    totals: JsonObject
 
     def to_json(self) -> dict[str, object]:
         """Return the timesteps and totals as the command line's JSON has them."""

@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from robot_formation.analysis.conditions import conditions_text, run_facts
 from robot_formation.analysis.errors import AnalysisError
@@ -16,6 +15,7 @@ from robot_formation.analysis.run_record import RunRecord
 from robot_formation.bag.folder import bag_name
 from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion
+from robot_formation.json_values import JsonObject
 
 _HEADERS = (
     ("", "predicted", "moved", "correction", "residual", "moves", "formation", "heading"),
@@ -140,7 +140,7 @@ def _totals(follower: FollowerAnalysis) -> list[str]:
     return [f"{name.ljust(width)}  {value}" for name, value in said]
 
 
-def _correction(values: dict[str, Any]) -> str:
+def _correction(values: JsonObject) -> str:
     if values["correction_m"] is None:
         return _NONE
     u, v, both = (_scaled(values[key], 100.0) for key in ("correction_u_m", "correction_v_m", "correction_m"))
@@ -152,7 +152,7 @@ def _movements(values: dict[str, object]) -> str:
     return f"{values['movements']}{'' if per_timestep is None else f' ({per_timestep:.2f} per timestep)'}"
 
 
-def _moves(values: dict[str, Any]) -> list[tuple[str, str]]:
+def _moves(values: JsonObject) -> list[tuple[str, str]]:
     axes, kinds = values["moves_by_axis"], values["moves_by_kind"]
     said = [("  by axis", ", ".join(f"{axis} {count}" for axis, count in axes.items()))] if axes else []
     if kinds:
@@ -160,7 +160,7 @@ def _moves(values: dict[str, Any]) -> list[tuple[str, str]]:
     return said
 
 
-def _losses(values: dict[str, Any]) -> list[tuple[str, str]]:
+def _losses(values: JsonObject) -> list[tuple[str, str]]:
     losses = values["losses"]
     if not losses:
         return []
@@ -171,13 +171,13 @@ def _losses(values: dict[str, Any]) -> list[tuple[str, str]]:
     return [("neighbour out of view", text)]
 
 
-def _formation_error(values: dict[str, Any]) -> str:
+def _formation_error(values: JsonObject) -> str:
     keys = ("rmse_m", "bias_u_m", "bias_v_m", "scatter_m")
     rmse, bias_u, bias_v, scatter = (_scaled(values[f"formation_error_{key}"], 100.0) for key in keys)
     return f"RMSE {rmse} cm (bias u {bias_u}, v {bias_v}; scatter {scatter})"
 
 
-def _overhead_error(values: dict[str, Any]) -> list[tuple[str, str]]:
+def _overhead_error(values: JsonObject) -> list[tuple[str, str]]:
     errors = values["overhead_error_m"] or {}
     texts = [
         f"{robot} RMS {_scaled(error['rms'], 100.0)}, max {_scaled(error['max'], 100.0)} cm"

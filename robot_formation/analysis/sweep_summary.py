@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from robot_formation.json_values import JsonObject
 
 BASELINE = "previous"
 RESAMPLES = 2000
@@ -65,7 +67,7 @@ def summarise(rows: Sequence[RunRow]) -> list[dict[str, object]]:
         groups.setdefault((row.track, row.surface, row.predictor), {})[row.seed] = row
     found = []
     for (track, surface, predictor), runs in groups.items():
-        entry: dict[str, Any] = {"track": track, "surface": surface, "predictor": predictor, "runs": len(runs)}
+        entry: JsonObject = {"track": track, "surface": surface, "predictor": predictor, "runs": len(runs)}
         entry["lost"] = sum(row.lost for row in runs.values())
         entry["lost_rate"] = entry["lost"] / len(runs)
         for name in MEDIANS:
@@ -140,7 +142,7 @@ def _ratio(own_m: float, other_m: float) -> float:
     return own_m / other_m
 
 
-def table(summary: Sequence[dict[str, Any]]) -> str:
+def table(summary: Sequence[JsonObject]) -> str:
     """Print the summary as a Markdown table: cm, with intervals in brackets."""
     lines = [
         "| track | surface | predictor | runs | lost | correction [cm] | reduction [%] | RMSE [cm] | moves per step | "

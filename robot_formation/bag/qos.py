@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import yaml
 
 from robot_formation.bag.errors import BagError
 from robot_formation.errors import shown
+from robot_formation.json_values import Json
 from robot_formation.names import Qos
 from robot_formation.system.yaml_files import YamlError, parse_yaml
 
@@ -94,8 +94,10 @@ def parse_profiles(text: str) -> tuple[TopicQos, ...]:
         raise BagError(f"the bag holds QoS profiles that can't be read ({type(error).__name__})") from error
 
 
-def _profile(item: Mapping[str, Any]) -> TopicQos:
-    policies = {policy: numbers.get(item[policy], item[policy]) for policy, numbers in _NUMBERED.items()}
+def _profile(item: Mapping[str, Json]) -> TopicQos:
+    policies: dict[str, Json] = {
+        policy: numbers.get(item[policy], item[policy]) for policy, numbers in _NUMBERED.items()
+    }
     return TopicQos(
         depth=item["depth"],
         deadline_ns=_nanoseconds(item["deadline"]),

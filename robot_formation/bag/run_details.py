@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from typing import Any
+
+from robot_formation.json_values import JsonObject
 
 
 def value(text: str) -> object:
@@ -23,13 +24,13 @@ def _finite(text: str) -> float:
     return number
 
 
-def mapping(details: Mapping[str, str], key: str) -> dict[str, Any]:
+def mapping(details: Mapping[str, str], key: str) -> JsonObject:
     """Read a JSON object; empty where it is missing or something else."""
     found = value(details.get(key, ""))
     return found if isinstance(found, dict) else {}
 
 
-def node_parameters(details: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+def node_parameters(details: Mapping[str, str]) -> dict[str, JsonObject]:
     """Read the parameters of the run's nodes, flat, by kind of node; empty where it says none or nonsense."""
     return {kind: found for kind, found in mapping(details, "parameters").items() if isinstance(found, dict)}
 

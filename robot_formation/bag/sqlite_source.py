@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any
 
 from rosbags.interfaces import ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.rosbag2 import Reader
@@ -14,6 +13,7 @@ from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.source import RawMessage, Source
 from robot_formation.errors import shown
+from robot_formation.json_values import Json
 from robot_formation.system.files import check_file
 
 _ENCODINGS = {MessageDefinitionFormat.MSG: "ros2msg", MessageDefinitionFormat.IDL: "ros2idl"}
@@ -82,14 +82,14 @@ class SqliteSource(Source):
         self._reader.close()
 
 
-def _check(value: object, kind: type, what: str) -> Any:
+def _check(value: object, kind: type, what: str) -> Json:
     """Refuse what SQLite lets into any column."""
     if not isinstance(value, kind):
         raise BagError(f"{what} in the database is {shown(value)}")
     return value
 
 
-def _qos(profile: Any) -> TopicQos:
+def _qos(profile: Json) -> TopicQos:
     """Convert rosbags' profile."""
     times = (profile.deadline, profile.lifespan, profile.liveliness_lease_duration)
     deadline_ns, lifespan_ns, lease_ns = (time.sec * 10**9 + time.nsec for time in times)

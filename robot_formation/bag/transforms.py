@@ -12,7 +12,7 @@ import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from robot_formation import names
 from robot_formation.bag.definitions import jazzy_typestore
@@ -96,7 +96,7 @@ def _inside(namespace: str, topic: names.Topic) -> names.Topic:
     return replace(topic, name=names.absolute(namespace, topic.name))
 
 
-def _of_odometry(message: Message) -> Any:
+def _of_odometry(message: Message) -> Message:
     types = jazzy_typestore().types
     pose = message.pose.pose
     place = types["geometry_msgs/msg/Vector3"](pose.position.x, pose.position.y, pose.position.z)

@@ -11,9 +11,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar, get_args, get_type_hints
+from typing import Generic, TypeVar, get_args, get_type_hints
 
 from robot_formation.errors import FormationError
+from robot_formation.json_values import JsonObject
 from robot_formation.system.files import MOST_RECORD_BYTES, read_file, whole_lines
 
 Row = TypeVar("Row")
@@ -81,7 +82,7 @@ class ResumableTable(Generic[Row]):
         return ["" if value is None else value for value in values]
 
 
-def read_record(path: Path) -> dict[str, Any]:
+def read_record(path: Path) -> JsonObject:
     """Read what a table's rows depend on.
 
     Raises:

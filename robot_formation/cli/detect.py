@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation.cli.messages import say
 from robot_formation.cli.option_types import positive_whole
 from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
+from robot_formation.json_values import JsonObject
 
 if TYPE_CHECKING:
     from robot_formation.vision.aruco_detector import BlockSensor
@@ -149,7 +150,7 @@ def _mask(args: argparse.Namespace, parameters: DetectorParameters, picture: Pic
     write_mask(args.mask, picture, matching_signatures(picture, table))
 
 
-def _table(results: list[dict[str, Any]]) -> str:
+def _table(results: list[JsonObject]) -> str:
     """One line per image and one per block."""
     lines = []
     for result in results:

@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import time
+from types import FrameType
 from typing import Any
 
 from robot_formation.system import signal_handling
@@ -48,7 +49,7 @@ class Interrupts:
         """From now on a signal ends the process at once with this exit code: only Python's own end is left to do."""
         self._leaving = code
 
-    def _take(self, number: int, frame: Any) -> None:
+    def _take(self, number: int, frame: FrameType | None) -> None:
         if self._leaving is not None:
             os._exit(self._leaving)
         now = time.monotonic()
@@ -68,7 +69,7 @@ class Interrupts:
             sys.__unraisablehook__(unraisable)
 
 
-def _raise(number: int, frame: Any) -> None:
+def _raise(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 

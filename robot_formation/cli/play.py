@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation import exit_codes
 from robot_formation.cli.messages import say, warn
 from robot_formation.cli.option_types import number
 from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
+from robot_formation.json_values import JsonObject
 
 if TYPE_CHECKING:
     from robot_formation.nodes.player.player_node import PlayerParameters, PlayReport
@@ -125,7 +126,7 @@ def _tell(args: argparse.Namespace, report: PlayReport) -> None:
         )
 
 
-def _to_json(args: argparse.Namespace, report: PlayReport) -> dict[str, Any]:
+def _to_json(args: argparse.Namespace, report: PlayReport) -> JsonObject:
     return {
         "bag": str(args.bag),
         "messages": sum(report.messages.values()),

@@ -6,12 +6,13 @@ import argparse
 import json
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation.cli.messages import say, warn
 from robot_formation.cli.option_types import positive
 from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
+from robot_formation.json_values import JsonObject
 
 if TYPE_CHECKING:
     from robot_formation.bag.bag_path import PathReservation
@@ -143,7 +144,7 @@ def _warnings(report: RecordReport) -> list[str]:
     return found
 
 
-def _to_json(report: RecordReport) -> dict[str, Any]:
+def _to_json(report: RecordReport) -> JsonObject:
     return {
         "bag": str(report.path),
         "messages": sum(report.message_counts.values()),

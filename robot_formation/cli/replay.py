@@ -8,10 +8,11 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError, shown
+from robot_formation.json_values import Json, JsonObject
 
 if TYPE_CHECKING:
     from robot_formation.experiment.recorded_run import Recording
@@ -77,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _changes(kind: str, settings: Sequence[str]) -> dict[str, Any]:
+def _changes(kind: str, settings: Sequence[str]) -> JsonObject:
     """Read --set as `formation run` does; settings of other nodes are refused."""
     from robot_formation.system.yaml_files import YamlError, parse_yaml
 
@@ -96,14 +97,14 @@ def _changes(kind: str, settings: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def _predictor(recording: Recording, changes: dict[str, Any]) -> tuple[Any, str]:
+def _predictor(recording: Recording, changes: JsonObject) -> tuple[Json, str]:
     from robot_formation.experiment.replay import replay_predictor
 
     found = replay_predictor(recording, changes)
     return [_prediction_json(replay) for replay in found], "\n\n".join(_prediction_text(replay) for replay in found)
 
 
-def _prediction_json(replay: PredictionReplay) -> dict[str, Any]:
+def _prediction_json(replay: PredictionReplay) -> JsonObject:
     return {
         "robot": replay.robot,
         "identical": replay.identical,
@@ -139,15 +140,15 @@ def _prediction_text(replay: PredictionReplay) -> str:
     return "\n".join([*lines, _verdict(replay.identical, replay.changed, len(replay.rows), "timesteps")])
 
 
-def _fine_tuner(recording: Recording, changes: dict[str, Any]) -> tuple[Any, str]:
+def _fine_tuner(recording: Recording, changes: JsonObject) -> tuple[Json, str]:
     from robot_formation.experiment.replay_fine_tuner import replay_fine_tuner
 
     found = replay_fine_tuner(recording, changes)
     return [_decisions_json(replay) for replay in found], "\n\n".join(_decisions_text(replay) for replay in found)
 
 
-def _decisions_json(replay: FineTunerReplay) -> dict[str, Any]:
-    def decided(decisions: Decisions) -> dict[str, Any]:
+def _decisions_json(replay: FineTunerReplay) -> JsonObject:
+    def decided(decisions: Decisions) -> JsonObject:
         moves = [{"u_m": move.u_m, "v_m": move.v_m, "yaw_rad": move.yaw_rad} for move in decisions.moves]
         return {"states": list(decisions.states), "moves": moves}
 
@@ -183,15 +184,15 @@ def _decided(decisions: Decisions) -> str:
     return f"{len(moves)} moves, u {u_m * 100:.2f} cm, v {v_m * 100:.2f} cm, {decisions.outcome}"
 
 
-def _detector(recording: Recording, changes: dict[str, Any]) -> tuple[Any, str]:
+def _detector(recording: Recording, changes: JsonObject) -> tuple[Json, str]:
     from robot_formation.experiment.replay import replay_detector
 
     found = replay_detector(recording, changes)
     return [_blocks_json(replay) for replay in found], "\n\n".join(_blocks_text(replay) for replay in found)
 
 
-def _blocks_json(replay: DetectionReplay) -> dict[str, Any]:
-    def listed(blocks: Any) -> Any:
+def _blocks_json(replay: DetectionReplay) -> JsonObject:
+    def listed(blocks: Json) -> Json:
         return None if blocks is None else [dataclasses.asdict(block) for block in blocks]
 
     return {
@@ -220,7 +221,7 @@ def _blocks_text(replay: DetectionReplay) -> str:
     return "\n".join([*lines, _verdict(replay.identical, replay.changed, len(replay.rows), "pictures")])
 
 
-def _boxes(blocks: Any) -> str:
+def _boxes(blocks: Json) -> str:
     return "; ".join(f"{b.signature}: {b.x}, {b.y}, {b.width}, {b.height}" for b in blocks or ()) or "nothing"
 
 
@@ -241,7 +242,7 @@ def _uv(name: str, motion: Motion | None) -> dict[str, float | None]:
     }
 
 
-_REPLAYS: dict[str, Callable[[Recording, dict[str, Any]], tuple[Any, str]]] = {
+_REPLAYS: dict[str, Callable[[Recording, JsonObject], tuple[Json, str]]] = {
     "predictor": _predictor,
     "fine_tuner": _fine_tuner,
     "block_detector": _detector,

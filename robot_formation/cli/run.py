@@ -8,12 +8,13 @@ import re
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation import exit_codes
 from robot_formation.cli.option_types import number, whole_number
 from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
+from robot_formation.json_values import JsonObject
 
 if TYPE_CHECKING:
     from robot_formation.bag.bag_path import PathReservation
@@ -197,7 +198,7 @@ def cut_off_json(args: argparse.Namespace, scenario: Scenario, result: RunResult
     from robot_formation.launching.processes import run_metadata
 
     facts = run_facts(run_metadata(scenario), in_process=args.in_process)
-    nothing: dict[str, Any] = {
+    nothing: JsonObject = {
         "scenario": scenario.setup.name,
         "outcome": "incomplete",
         "timesteps": [],
@@ -206,7 +207,7 @@ def cut_off_json(args: argparse.Namespace, scenario: Scenario, result: RunResult
     return json.dumps({**nothing, **facts, **_ending(result)}, indent=2)
 
 
-def _ending(result: RunResult) -> dict[str, Any]:
+def _ending(result: RunResult) -> JsonObject:
     """List what a run's JSON says of its files, and why it ended before its end."""
     return {
         "bag": None if result.bag is None else str(result.bag),

@@ -10,13 +10,14 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robot_formation import exit_codes
 from robot_formation.batch.progress_line import with_progress
 from robot_formation.cli.option_types import Names, whole_number
 from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
+from robot_formation.json_values import JsonObject
 
 if TYPE_CHECKING:
     from robot_formation.bag.bag_path import PathReservation
@@ -111,7 +112,7 @@ def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
     (folder / SUMMARY_NAME).write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
     (folder / TABLE_NAME).write_text(shown + "\n", encoding="utf-8")
     if args.json:
-        files: dict[str, Any] = {
+        files: JsonObject = {
             "bag": None,
             "pictures": [],
             "reason": None,
@@ -123,7 +124,7 @@ def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
     return exit_codes.DONE
 
 
-def _facts(plan: Plan) -> dict[str, Any]:
+def _facts(plan: Plan) -> JsonObject:
     """List what was run, for the JSON."""
     return {
         "tracks": list(plan.tracks),

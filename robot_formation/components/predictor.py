@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -152,6 +153,6 @@ class PredictorComponent(Component):
         u_m, v_m = forecast.command.tolist()
         self._send_prediction(Motion.from_uv(u_m, v_m), covariance.ravel().tolist())
 
-    def _send_prediction(self, mean: Motion, covariance: Any) -> None:
+    def _send_prediction(self, mean: Motion, covariance: Sequence[float]) -> None:
         base = self.place.frame(names.BASE_FRAME)
         self._send(names.PREDICTION, conversions.displacement(mean, base, self.stamp_ns, covariance))

@@ -10,12 +10,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import yaml
 
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import FormationError, shown
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.parameters import suggestion
 from robot_formation.system.yaml_files import read_yaml
 
@@ -42,9 +42,9 @@ class MotorCalibration:
     """Curves by robot and axis, and the values by name of what they were measured with."""
 
     robots: Mapping[str, Mapping[str, Curve]]
-    measured_with: Mapping[str, Any] = field(default_factory=dict)
+    measured_with: Mapping[str, Json] = field(default_factory=dict)
 
-    def differences(self, facts: Mapping[str, Any]) -> list[str]:
+    def differences(self, facts: Mapping[str, Json]) -> list[str]:
         """Name the facts that this calibration was measured with other values of; unknown names are no difference."""
         return differences(self.measured_with, facts)
 
@@ -89,7 +89,7 @@ def load_calibration(path: str | Path) -> MotorCalibration:
     )
 
 
-def read_sections(path: str | Path, section: str, *, what: str, verb: str) -> tuple[Mapping[str, Any], dict[str, Any]]:
+def read_sections(path: str | Path, section: str, *, what: str, verb: str) -> tuple[Mapping[str, Json], JsonObject]:
     """Read a calibration file's mapping of this name, and what it was measured with.
 
     Args:
@@ -111,7 +111,7 @@ def read_sections(path: str | Path, section: str, *, what: str, verb: str) -> tu
     return found, {str(name): value for name, value in facts.items()}
 
 
-def differences(measured_with: Mapping[str, Any], facts: Mapping[str, Any]) -> list[str]:
+def differences(measured_with: Mapping[str, Json], facts: Mapping[str, Json]) -> list[str]:
     """Name the facts that a calibration was measured with other values of; unknown names are no difference."""
     return [
         f"{name} {measured_with[name]} instead of {value}"
@@ -139,7 +139,7 @@ def save_calibration(path: str | Path, calibration: MotorCalibration) -> None:
         raise CalibrationError(f"{path}: can't be written ({error.strerror}); choose another folder") from error
 
 
-def _curves(curves: Any, where: str) -> dict[str, Curve]:
+def _curves(curves: Json, where: str) -> dict[str, Curve]:
     if not isinstance(curves, Mapping) or not curves:
         raise CalibrationError(f"{where}: needs curves by axis ({', '.join(AXES)}), not {shown(curves)}")
     for axis in curves:
@@ -148,7 +148,7 @@ def _curves(curves: Any, where: str) -> dict[str, Curve]:
     return {axis: _curve(curve, f"{where}: {axis}") for axis, curve in curves.items()}
 
 
-def _curve(values: Any, where: str) -> Curve:
+def _curve(values: Json, where: str) -> Curve:
     numbers = isinstance(values, Sequence) and all(
         isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) for value in values
     )

@@ -16,6 +16,7 @@ from robot_formation.bag.run_details import mapping, node_parameters
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.node_defaults import node_defaults
+from robot_formation.json_values import JsonObject
 from robot_formation.names import Message
 from robot_formation.parameters import from_mapping, specs
 from robot_formation.system.git_commit import git_commit
@@ -74,7 +75,7 @@ class Recording:
         """
         return list(self.messages(robot, topic)) if self.has(robot, topic) else []
 
-    def parameters(self, kind: str, changes: dict[str, Any]) -> Any:
+    def parameters(self, kind: str, changes: JsonObject) -> Any:
         """Make a node's parameter object: as recorded, with some changed.
 
         Raises:

@@ -10,6 +10,7 @@ from typing import Any
 from robot_formation import conversions, names
 from robot_formation.experiment.recorded_run import Recording, equal, handlers, host
 from robot_formation.geometry.se2 import Motion
+from robot_formation.json_values import JsonObject
 from robot_formation.names import Message
 from robot_formation.vision.pixy2.block import Block
 
@@ -45,7 +46,7 @@ class PredictionReplay:
     robot: str
     rows: tuple[PredictionRow, ...]
     identical: bool
-    sent: tuple[Any, ...]
+    sent: tuple[Message, ...]
 
     @property
     def changed(self) -> int:
@@ -59,7 +60,7 @@ class PredictionReplay:
         return math.sqrt(sum(squares) / len(squares)) if squares else None
 
 
-def replay_predictor(recording: Recording, changes: dict[str, Any]) -> list[PredictionReplay]:
+def replay_predictor(recording: Recording, changes: JsonObject) -> list[PredictionReplay]:
     """Show every follower's displacements, residuals and commanded distances to today's predictor.
 
     It begins knowing nothing and keeps no state, whatever the recorded one did, unless `changes` name a state file.
@@ -104,7 +105,7 @@ def _replay_predictor(recording: Recording, robot: str, parameters: Any) -> Pred
     return PredictionReplay(robot, tuple(rows), equal(recorded, today), tuple(today))
 
 
-def _by_stamp(messages: list[Message]) -> dict[int, Any]:
+def _by_stamp(messages: list[Message]) -> dict[int, Message]:
     return {conversions.stamp_of(message): message for message in messages}
 
 
@@ -150,7 +151,7 @@ class DetectionReplay:
         return sum(row.changed for row in self.rows)
 
 
-def replay_detector(recording: Recording, changes: dict[str, Any]) -> list[DetectionReplay]:
+def replay_detector(recording: Recording, changes: JsonObject) -> list[DetectionReplay]:
     """Show every follower's pictures to today's detector; arguments and errors as for `replay_predictor`."""
     parameters = recording.parameters("block_detector", changes)
     return [_replay_detector(recording, robot, parameters) for robot in recording.followers]

@@ -19,6 +19,7 @@ from robot_formation import conversions, names
 from robot_formation.experiment.recorded_run import Recording, equal, handlers, host
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
+from robot_formation.json_values import JsonObject
 from robot_formation.names import Message
 
 _SENT = (names.ALIGNMENT, names.MOVE, names.DISPLACEMENT, names.RESIDUAL)
@@ -81,7 +82,7 @@ class FineTunerReplay:
         return sum(row.changed for row in self.rows)
 
 
-def replay_fine_tuner(recording: Recording, changes: dict[str, Any]) -> list[FineTunerReplay]:
+def replay_fine_tuner(recording: Recording, changes: JsonObject) -> list[FineTunerReplay]:
     """Show every follower's blocks to today's fine-tuner.
 
     Args:

@@ -11,7 +11,7 @@ from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from robot_formation.analysis.conditions import conditions
 from robot_formation.analysis.quantities import analyse
@@ -21,7 +21,8 @@ from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
-from robot_formation.experiment.oracle import IDEAL, IdealRun
+from robot_formation.experiment.noise_floor import IDEAL, IdealRun
+from robot_formation.json_values import JsonObject
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.names import Message
 from robot_formation.parameters import suggestion
@@ -114,7 +115,7 @@ class Plan:
             for surface in self.surfaces:
                 build(Task(track, surface, self.predictors[0], self.seeds[0]), self.settings).check()
 
-    def conditions(self) -> dict[str, Any]:
+    def conditions(self) -> JsonObject:
         """List the conditions of all runs by name, as those of a single run."""
         scenario = build(Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0]), self.settings)
         found = conditions(scenario.by_node())
@@ -159,7 +160,7 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
         raise SweepError(f"{run}: {error}") from None
     totals = analysis.followers[0].totals
     # A sum of nothing is an integer 0, which the table would give back as another text.
-    quantities: dict[str, Any] = {
+    quantities: JsonObject = {
         field.name: None if totals[field.name] is None else float(totals[field.name]) for field in fields(Row)[6:]
     }
     return Row(

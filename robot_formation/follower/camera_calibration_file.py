@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import yaml
 
 from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.drive.curves import CalibrationError, read_sections
 from robot_formation.follower.fine_tuning import FineTunerParameters
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.parameters import ParameterError, from_mapping, suggestion, to_mapping
 
 T = TypeVar("T", bound=FineTunerParameters)
@@ -36,7 +37,7 @@ class VisionCalibration:
     """Values of `alignment.*` by name, and the values by name of what they were measured with."""
 
     alignment: Mapping[str, float]
-    measured_with: Mapping[str, Any] = field(default_factory=dict)
+    measured_with: Mapping[str, Json] = field(default_factory=dict)
 
 
 def calibrated(parameters: T) -> T:
@@ -49,7 +50,7 @@ def calibrated(parameters: T) -> T:
     """
     if not parameters.calibration_file:
         return parameters
-    values: dict[str, Any] = dict(load_vision(parameters.calibration_file).alignment)
+    values: JsonObject = dict(load_vision(parameters.calibration_file).alignment)
     return replace(parameters, alignment=replace(parameters.alignment, **values))
 
 

@@ -19,11 +19,12 @@ it is the solution where a pair's squared error weighs rho times as much as that
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.linear_algebra import KoopmanError, Matrix, Vector, as_lists
 from robot_formation.koopman.recursion import (
     LARGEST_P,
@@ -194,7 +195,7 @@ class OnlineDMD(RecursiveFit):
             self._trace = float((fit.s**2).sum())
             self._r, self._z = self._r[:0], self._z[:0]
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """Return all there is to know as numbers, lists and None, for `from_state` and JSON."""
         return {
             "settings": self.settings(),
@@ -207,7 +208,7 @@ class OnlineDMD(RecursiveFit):
         }
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> OnlineDMD:
+    def from_state(cls, state: Mapping[str, Json]) -> OnlineDMD:
         """Make one that goes on, to the last bit, where another one's `state` was taken.
 
         Raises:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.linear_algebra import (
     KoopmanError,
     Matrix,
@@ -127,7 +127,7 @@ class RecursiveFit:
         bound = max(s[0] / min(condition, self.max_condition), _FINEST) if s.size else 0.0
         return len(s) == self.dimension and bool(s[-1] >= bound and s[0] <= _COARSEST)
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> JsonObject:
         """Return the arguments of the constructor."""
         return {
             "dimension": self.dimension,
@@ -162,7 +162,7 @@ def reading_state() -> Iterator[None]:
         raise KoopmanError(f"the stored state is none of this kind of model: {error}") from error
 
 
-def restored(state: Mapping[str, Any], name: str, rows: int | None, columns: int) -> Matrix:
+def restored(state: Mapping[str, Json], name: str, rows: int | None, columns: int) -> Matrix:
     """Read a matrix from a stored state; one without rows has the given number of columns.
 
     Raises:
@@ -172,7 +172,7 @@ def restored(state: Mapping[str, Any], name: str, rows: int | None, columns: int
     return np.array(as_matrix(stored, f"'{name}' of the stored state", rows, columns))
 
 
-def restored_p(state: Mapping[str, Any], dimension: int) -> Matrix | None:
+def restored_p(state: Mapping[str, Json], dimension: int) -> Matrix | None:
     """Read P from a stored state.
 
     Raises:

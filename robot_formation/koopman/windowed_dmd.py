@@ -9,11 +9,11 @@ with each pair, in O(w n^2): a tenth of a millisecond for a window of 20, and ex
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.linear_algebra import KoopmanError, Matrix, Vector, as_lists
 from robot_formation.koopman.recursion import RecursiveFit, inverse_gram, reading_state, restored
 
@@ -96,7 +96,7 @@ class WindowedDMD(RecursiveFit):
         self.k, self._singular, self._directions = self.solve(rows, targets)
         self._pairs, self._prior_share = pairs, prior_share
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """Return all there is to know as numbers, lists and None, for `from_state` and JSON."""
         return {
             "settings": {**self.settings(), "window": self.window},
@@ -106,7 +106,7 @@ class WindowedDMD(RecursiveFit):
         }
 
     @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> WindowedDMD:
+    def from_state(cls, state: Mapping[str, Json]) -> WindowedDMD:
         """Make one that goes on, to the last bit, where another one's `state` was taken.
 
         Raises:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.network.loopback import PROFILES, RANGE, use_loopback
 from robot_formation.paths import config_dir
-from robot_formation.system.yaml_files import read_yaml
+from robot_formation.system.yaml_files import Yaml, read_yaml
 
 _SWITCH = ("true", "false", "True", "False", "1", "0")
 _OPENING, _CLOSING = "[{", "]}"
@@ -141,7 +140,7 @@ def rviz_remappings(namespace: str) -> list[tuple[str, str]]:
     return [(topic, f"{namespace.rstrip('/')}{topic}") for topic in topics]
 
 
-def _topics(displays: Any) -> Iterator[str]:
+def _topics(displays: Yaml) -> Iterator[str]:
     """Find the topics in RViz's displays: the values of 'Topic' and 'Description Topic'."""
     for display in displays:
         for entry in ("Topic", "Description Topic"):

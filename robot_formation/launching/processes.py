@@ -6,13 +6,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from robot_formation import names
 from robot_formation.bag.provenance import versions
 from robot_formation.calibration.camera_check import camera_values
 from robot_formation.calibration.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.parameters import to_mapping
 from robot_formation.system.git_commit import git_commit
 
@@ -25,14 +25,14 @@ class Process:
 
     executable: str
     namespace: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, Json]
 
     @property
     def name(self) -> str:
         """The node's full name, for people."""
         return _inside(self.namespace, self.executable)
 
-    def ros_parameters(self) -> dict[str, Any]:
+    def ros_parameters(self) -> JsonObject:
         """Give the parameters as a ROS parameter file holds them: no empty lists, ROS can't tell their type."""
         return {name: value for name, value in self.parameters.items() if value != []}
 

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from robot_formation.errors import shown
+from robot_formation.json_values import Json
 from robot_formation.parameters import ParameterError, from_mapping, specs, suggestion
 from robot_formation.surface.base import PLATE_SIZE_M, GradientNormal, Surface
 from robot_formation.surface.bowl import Bowl
@@ -45,7 +46,7 @@ SURFACES: Mapping[str, type[Any]] = MappingProxyType({kind.name: kind for kind i
 """Surface classes by name."""
 
 
-def make_surface(name: str, parameters: Mapping[str, Any] = MappingProxyType({})) -> Surface:
+def make_surface(name: str, parameters: Mapping[str, Json] = MappingProxyType({})) -> Surface:
     """Build a surface.
 
     Args:
@@ -66,7 +67,7 @@ def surface_from_texts(name: str, texts: Sequence[str]) -> Surface:
         ParameterError: as `make_surface`, and on a text that is no name and value of the parameter's type.
     """
     known = specs(_kind(name))
-    values: dict[str, Any] = {}
+    values: dict[str, Json] = {}
     for text in texts:
         key, equals, value = text.partition("=")
         if not equals:

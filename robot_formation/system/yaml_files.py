@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import yaml
 
@@ -22,6 +22,9 @@ _MOST_BITS = 1024  # of a whole number: more than a float can hold
 _MERGE = "tag:yaml.org,2002:merge"
 
 # libyaml's parser where PyYAML was built with it: ten times as fast.
+Yaml: TypeAlias = Any
+"""A value of a YAML file."""
+
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -39,7 +42,7 @@ class YamlError(FormationError):
         self.line = line
 
 
-def parse_yaml(text: str | bytes) -> Any:
+def parse_yaml(text: str | bytes) -> Yaml:
     """Read a YAML text safely: plain values, lists and mappings; None of an empty text.
 
     Raises:
@@ -72,7 +75,7 @@ def parse_yaml(text: str | bytes) -> Any:
             loader.dispose()
 
 
-def read_yaml(path: str | Path, *, refuse: type[FormationError], remedy: str) -> Any:
+def read_yaml(path: str | Path, *, refuse: type[FormationError], remedy: str) -> Yaml:
     """Read a YAML (or JSON) file safely.
 
     Args:
@@ -96,7 +99,7 @@ def read_yaml(path: str | Path, *, refuse: type[FormationError], remedy: str) ->
 class _Loader(_Base):  # type: ignore[misc]
     """Gives every failure of a value the line that it stands in."""
 
-    def construct_object(self, node: Any, deep: bool = False) -> Any:
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Yaml:
         try:
             value = super().construct_object(node, deep=deep)
         except yaml.YAMLError:
@@ -114,7 +117,7 @@ class _Loader(_Base):  # type: ignore[misc]
         return value
 
 
-def _check_events(events: Iterator[Any]) -> None:
+def _check_events(events: Iterator[yaml.Event]) -> None:
     """Refuse what would be too deep or too large: the parser itself needs no more memory than the text."""
     sizes: dict[str, int] = {}
     open_nodes: list[tuple[str | None, int]] = [(None, 0)]
@@ -140,7 +143,7 @@ def _check_events(events: Iterator[Any]) -> None:
                 raise YamlError(f"it holds more than {_MOST_VALUES} values, each alias counted anew", line)
 
 
-def _check_keys(root: Any) -> None:
+def _check_keys(root: yaml.Node | None) -> None:
     """Refuse mappings that give a key twice, of which YAML would silently keep the last."""
     waiting, seen = [root], set()
     while waiting:

@@ -7,11 +7,11 @@ from typing import Any, Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from robot_formation.parameters import parameter
 from robot_formation.vision.aruco_patterns import MODULES, QUIET_MODULES, dictionary
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import Tracker, limited
 from robot_formation.vision.pixy2.boxes import Box
@@ -64,7 +64,7 @@ class TagParameters:
 class BlockSensor(Protocol):
     """What turns pictures into tracked blocks: signatures 1, 2 and 3 are the Target, Front and Rear faces."""
 
-    def process(self, picture: Any, time_us: int) -> list[Block]:
+    def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
         """Take the next frame, RGB (208, 316, 3) uint8 at a time in microseconds, and report the tracked blocks.
 
         Raises:
@@ -105,7 +105,7 @@ class TagDetector:
         """Forget all tracked blocks; the next frame starts the clock and the indices anew."""
         self._tracker.reset()
 
-    def faces(self, picture: Any) -> list[tuple[Face, Points]]:
+    def faces(self, picture: ArrayLike) -> list[tuple[Face, Points]]:
         """Find the faces in a single picture, by number and from left to right.
 
         Args:
@@ -131,7 +131,7 @@ class TagDetector:
                 faces.append((Face(number), _outline(square)))
         return sorted(faces, key=lambda entry: (entry[0], float(entry[1][:, 0].min())))
 
-    def detect(self, picture: Any) -> list[Box]:
+    def detect(self, picture: ArrayLike) -> list[Box]:
         """Boxes of the faces in a single picture, without tracking.
 
         Raises:
@@ -139,7 +139,7 @@ class TagDetector:
         """
         return [_box(face, corners) for face, corners in self.faces(picture)]
 
-    def process(self, picture: Any, time_us: int) -> list[Block]:
+    def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
         """See `BlockSensor`."""
         reported = self._tracker.step(self.detect(picture), time_us)
         return limited(reported, ALL_SIGNATURES, len(reported))

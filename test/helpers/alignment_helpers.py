@@ -5,7 +5,7 @@ import numpy as np
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, Matrix, Vector
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 MODEL = MarkerModel(GeometryParameters())

@@ -11,11 +11,11 @@ filter: the total is known well, the camera says what is left. A model forecasts
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Model, TrendFilter, Vector, array, covariance
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 
@@ -86,7 +86,7 @@ class ResidualFilter:
         """Estimated leader-induced displacement of the timestep to come (2,)."""
         return np.asarray((self.weights * self._means[..., 1]).sum(axis=0))
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """Take all that it has learned."""
         return {
             "means": self._means.tolist(),
@@ -94,7 +94,7 @@ class ResidualFilter:
             "losses": self._losses.tolist(),
         }
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """Put back what `state` took."""
         self._means = array(state["means"], *self._means.shape)
         self._covariances = covariance(state["covariances"], *self._covariances.shape)
@@ -147,7 +147,7 @@ class Closing:
             notes[name] = np.array2string(value, precision=6, separator=", ")
         return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """Take all that it has learned."""
         return {
             "model": self._model.state(),
@@ -156,7 +156,7 @@ class Closing:
             "seen": self._seen,
         }
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """Put back what `state` took."""
         self._model.restore(state["model"])
         self._filter.restore(state["filter"])

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.online_dmd import OnlineDMD
 from robot_formation.koopman.predictors.dictionary_text import dictionary_from_text
 from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Vector, array, optional, vector
@@ -50,7 +50,7 @@ class Literal:
             condition = float(np.linalg.cond(np.column_stack(self._collected[:-1])))
         return Diagnostics(k=self._k, condition_number=condition)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """See `Model`."""
         return {
             "collected": [x.tolist() for x in self._collected],
@@ -58,7 +58,7 @@ class Literal:
             "state": self._state.tolist(),
         }
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """See `Model`."""
         self._collected = [vector(x) for x in state["collected"]]
         self._k = None if state["k"] is None else array(state["k"], 2, 2)
@@ -96,7 +96,7 @@ class Measured:
             return Diagnostics()
         return Diagnostics(self._dmd.k, self._dmd.condition_number, self._innovation)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """See `Model`."""
         return {
             "dmd": self._dmd.state(),
@@ -105,7 +105,7 @@ class Measured:
             "innovation": optional(self._innovation),
         }
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """See `Model`."""
         _require_same_settings(self._dmd, state["dmd"])
         self._dmd = OnlineDMD.from_state(state["dmd"])
@@ -156,7 +156,7 @@ class Edmd:
         notes = {"observables": ", ".join(self._dictionary.names)}
         return Diagnostics(self._dmd.k, self._dmd.condition_number, innovation, notes)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """See `Model`."""
         return {
             "dmd": self._dmd.state(),
@@ -165,7 +165,7 @@ class Edmd:
             "innovation": optional(self._innovation),
         }
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """See `Model`."""
         _require_same_settings(self._dmd, state["dmd"])
         self._dmd = type(self._dmd).from_state(state["dmd"])
@@ -175,7 +175,7 @@ class Edmd:
         self._innovation = vector(state["innovation"], size) if state["innovation"] is not None else None
 
 
-def _require_same_settings(fresh: OnlineDMD | WindowedDMD, state: Mapping[str, Any]) -> None:
+def _require_same_settings(fresh: OnlineDMD | WindowedDMD, state: Mapping[str, Json]) -> None:
     """Refuse a fit that was made with other settings: it would go on with those.
 
     Raises:

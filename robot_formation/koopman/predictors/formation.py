@@ -8,10 +8,10 @@ each axis their forecasts are weighted by how well each has done lately (discoun
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.dmd import Edmd
 from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Model, Previous, Vector, array
 from robot_formation.koopman.predictors.parameters import PredictorParameters
@@ -51,12 +51,12 @@ class Mixture:
         notes["weight of koopman"] = np.array2string(self._weights()[1], precision=3, separator=", ")
         return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """See `Model`."""
         models = {name: model.state() for name, model in self._models.items()}
         return {"models": models, "losses": self._losses.tolist(), "begun": self._begun}
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """See `Model`."""
         for name, model in self._models.items():
             model.restore(state["models"][name])

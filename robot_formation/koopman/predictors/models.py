@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.parameters import PredictorParameters, TrendParameters
 
 Vector = NDArray[np.float64]
@@ -45,10 +46,10 @@ class Model(Protocol):
     def diagnostics(self) -> Diagnostics:
         """Show K and its quality where the model has them."""
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """Take all that it has learned, as numbers, lists and None."""
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """Put back what `state` took from a model with the same parameters."""
 
 
@@ -70,11 +71,11 @@ class Previous:
         """See `Model`."""
         return Diagnostics()
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """See `Model`."""
         return {"last": self._last.tolist()}
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """See `Model`."""
         self._last = vector(state["last"])
 
@@ -99,11 +100,11 @@ class Ewma:
         """See `Model`."""
         return Diagnostics()
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """See `Model`."""
         return {"mean": optional(self._mean)}
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """See `Model`."""
         self._mean = None if state["mean"] is None else vector(state["mean"])
 
@@ -146,14 +147,14 @@ class TrendFilter:
         """Forecast the next value (2,); zero before there is any."""
         return np.zeros(2) if self._state is None else self._state[0].copy()
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """Take all that it has learned."""
         return {
             "state": None if self._state is None else self._state.tolist(),
             "covariance": self._covariance.tolist(),
         }
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """Put back what `state` took."""
         self._state = None if state["state"] is None else array(state["state"], 2, 2)
         self._covariance = covariance(state["covariance"], 2, 2)
@@ -177,16 +178,16 @@ class KalmanTrend:
         """See `Model`."""
         return Diagnostics()
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """See `Model`."""
         return self._filter.state()
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Json]) -> None:
         """See `Model`."""
         self._filter.restore(state)
 
 
-def vector(values: Any, size: int = 2) -> Vector:
+def vector(values: ArrayLike, size: int = 2) -> Vector:
     """Read a vector from a state.
 
     Raises:
@@ -195,7 +196,7 @@ def vector(values: Any, size: int = 2) -> Vector:
     return array(values, size)
 
 
-def array(values: Any, *shape: int) -> NDArray[np.float64]:
+def array(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
     """Read an array of this shape from a state.
 
     Raises:
@@ -207,7 +208,7 @@ def array(values: Any, *shape: int) -> NDArray[np.float64]:
     return found
 
 
-def covariance(values: Any, *shape: int) -> NDArray[np.float64]:
+def covariance(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
     """Read covariance matrices of this shape (..., n, n) from a state.
 
     Raises:

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from robot_formation.errors import FormationError
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.linear_algebra import KoopmanError
 from robot_formation.koopman.predictors.closing import Closing
 from robot_formation.koopman.predictors.dmd import Edmd, Literal, Measured
@@ -161,7 +162,7 @@ class Predictor:
         uv = self._uv / self._weight
         return Forecast(mean, np.array(((self._uu / self._weight, uv), (uv, self._vv / self._weight))), command)
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> JsonObject:
         """Take all that it has learned, as numbers, lists, text and None (JSON)."""
         return {
             "name": self.name,
@@ -173,7 +174,7 @@ class Predictor:
         }
 
     @classmethod
-    def from_state(cls, parameters: PredictorParameters, state: Mapping[str, Any]) -> Predictor:
+    def from_state(cls, parameters: PredictorParameters, state: Mapping[str, Json]) -> Predictor:
         """Make a predictor that goes on where another one's `state` was taken.
 
         Raises:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -12,6 +11,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.qos import TopicQos
+from robot_formation.names import Message
 
 # What a best-effort publisher keeps: more than any burst of a bag needs.
 _BEST_EFFORT_DEPTH = 100
@@ -47,7 +47,7 @@ class Republisher:
         profiles: what its publishers offered when it was recorded.
     """
 
-    def __init__(self, node: Node, name: str, message_class: Any, profiles: Sequence[TopicQos]) -> None:
+    def __init__(self, node: Node, name: str, message_class: type[Message], profiles: Sequence[TopicQos]) -> None:
         qos = republishing(profiles)
         self._publisher = node.create_publisher(message_class, name, qos)
         self._depth = qos.depth if qos.history == HistoryPolicy.KEEP_LAST else 0

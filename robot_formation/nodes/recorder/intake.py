@@ -10,6 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from robot_formation.bag.losses import LossCounter
+from robot_formation.names import Message
 
 
 class Intake:
@@ -36,7 +37,7 @@ class Intake:
         self,
         node: Node,
         topic: str,
-        message_class: Any,
+        message_class: type[Message],
         qos: QoSProfile,
         publishers: int,
         take: Callable[[bytes], None],

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
+from rclpy.task import Future
 
 KEY = "parameters of "
 """What the keys in the metadata begin with; the node's full name follows."""
@@ -41,12 +41,12 @@ class ParameterSnapshot:
                 self._listed.add(full)
                 client.list_parameters(callback=partial(self._on_names, full))
 
-    def _on_names(self, full: str, future: Any) -> None:
+    def _on_names(self, full: str, future: Future) -> None:
         names = list(future.result().result.names) if future.result() is not None else []
         if names:
             self._asked[full].get_parameters(names, callback=partial(self._on_values, full, names))
 
-    def _on_values(self, full: str, names: list[str], future: Any) -> None:
+    def _on_values(self, full: str, names: list[str], future: Future) -> None:
         if future.result() is None:
             return
         values = [parameter_value_to_python(value) for value in future.result().values]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -26,6 +26,7 @@ from robot_formation.bag.recording_queue import QUEUE_BYTES, RecordingQueue
 from robot_formation.bag.selection import Selection
 from robot_formation.bag.transforms import Transforms, made_in
 from robot_formation.bag.writer import WriteOptions
+from robot_formation.names import Message
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.ros_parameters import HostParameters, ParameterNode, declare
 from robot_formation.nodes.host.signals import stopped
@@ -254,7 +255,7 @@ class RecorderNode:
             self._warn(f"{name} is not recorded: its type is {type_name} instead of {made}")
             return
         try:
-            message_class: Any = conversions.message_class(type_name)
+            message_class: type[Message] = conversions.message_class(type_name)
             what = definition(type_name)
         except (BagError, ImportError, AttributeError, ValueError) as error:
             self._ignored.add(name)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+
+from numpy.typing import ArrayLike
 
 from robot_formation.vision.pixy2.blobs import connect
 from robot_formation.vision.pixy2.block import Block
@@ -66,7 +67,7 @@ class BlockDetector:
         self._tracker.reset()
         self._reported = []
 
-    def detect(self, picture: Any) -> list[Box]:
+    def detect(self, picture: ArrayLike) -> list[Box]:
         """Boxes in a single picture, without tracking.
 
         Args:
@@ -80,7 +81,7 @@ class BlockDetector:
         """
         return self._boxes(self._scanner.scan(checked(picture)))
 
-    def process(self, picture: Any, time_us: int) -> list[Block]:
+    def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
         """Take the next frame and report the tracked blocks.
 
         Args:

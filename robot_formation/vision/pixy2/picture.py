@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import ArrayLike
 
 from robot_formation.errors import FormationError
 
@@ -24,7 +23,7 @@ class PictureError(FormationError):
     """A picture has the wrong shape or type; the text says what is expected."""
 
 
-def checked(picture: Any) -> Picture:
+def checked(picture: ArrayLike) -> Picture:
     """Return the picture as a contiguous array.
 
     Args:

@@ -8,13 +8,13 @@ import tempfile
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 from PIL import Image
 
 from robot_formation.errors import shown
+from robot_formation.json_values import Json, JsonObject
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.system.files import read_file
 from robot_formation.system.png_files import png_head, unpacks_within
@@ -147,14 +147,14 @@ def read_parameters(path: str | Path, warn: Callable[[str], None]) -> DetectorPa
     return from_mapping(DetectorParameters, own, where=str(path))
 
 
-def _by_own_names(content: Mapping[str, Any], where: str) -> dict[str, Any]:
+def _by_own_names(content: Mapping[str, Json], where: str) -> JsonObject:
     """Parameters by our names: in lower case with underscores, the signatures' ranges in one list."""
-    values: dict[str, Any] = {}
-    ranges: dict[int, Any] = {}
+    values: JsonObject = {}
+    ranges: dict[int, Json] = {}
     for given, value in content.items():
         name = "_".join(re.findall("[a-z0-9]+", given.lower()))
         single = _RANGE.fullmatch(name)
-        known: dict[Any, Any] = ranges if single else values
+        known: dict[Json, Json] = ranges if single else values
         key = int(single[1]) if single else name or given
         if key in known:
             raise ParameterError(f"{where}: {shown(given)} is given twice; keep one of them")

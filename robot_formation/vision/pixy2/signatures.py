@@ -7,12 +7,13 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
+from numpy.typing import ArrayLike
 
 from robot_formation.errors import FormationError, shown
+from robot_formation.json_values import Json
 from robot_formation.system.yaml_files import read_yaml
 from robot_formation.vision.pixy2.parameters import SIGNATURES
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, checked
@@ -84,7 +85,7 @@ class Signature:
         return {stored: getattr(self, name) for name, stored in _FILE_NAMES.items()}
 
     @classmethod
-    def from_mapping(cls, values: Any, *, where: str) -> Signature:
+    def from_mapping(cls, values: Json, *, where: str) -> Signature:
         """Build a signature from the names used in files; rgb and type may be missing.
 
         Raises:
@@ -110,7 +111,7 @@ class Signature:
             raise SignatureError(f"{where}: {error}") from None
 
 
-def teach_region(picture: Any, region: Sequence[int], sig: int) -> Signature:
+def teach_region(picture: ArrayLike, region: Sequence[int], sig: int) -> Signature:
     """Teach a signature from a rectangle, as "Set signature" does in PixyMon.
 
     Args:
@@ -131,7 +132,7 @@ def teach_region(picture: Any, region: Sequence[int], sig: int) -> Signature:
     return _signature(frame, [(x, y, width, height)], sig)
 
 
-def teach_point(picture: Any, point: Point, threshold: int, sig: int) -> tuple[Signature, list[Point]]:
+def teach_point(picture: ArrayLike, point: Point, threshold: int, sig: int) -> tuple[Signature, list[Point]]:
     """Teach a signature by growing from a point, as the camera's button does from the centre (158, 104).
 
     Args:

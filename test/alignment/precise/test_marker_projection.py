@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, relative_tilt
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 
 P = GeometryParameters()
 MATRIX = np.array([[P.focal_length_px, 0.0, P.centre_x_px], [0.0, P.focal_length_px, P.centre_y_px], [0.0, 0.0, 1.0]])

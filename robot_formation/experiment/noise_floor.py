@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -110,7 +109,7 @@ class TargetFace:
         )
 
 
-def _changed(commanded: Message, change: Motion) -> Any:
+def _changed(commanded: Message, change: Motion) -> Message:
     """Tell the predictor of the move that was commanded in place of its own: it learns the robot's bias from it."""
     if not conversions.has_estimate(commanded):
         return commanded
