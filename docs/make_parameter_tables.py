@@ -19,7 +19,7 @@ from typing import Any
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment.node_defaults import node_defaults
-from robot_formation.experiment.scenario_schema import scenario_schema
+from robot_formation.experiment.scenario_json_schema import scenario_schema
 from robot_formation.nodes.host.ros_parameters import AT_START, HostParameters, reasons
 from robot_formation.nodes.player.player_node import PlayerNode, PlayerParameters
 from robot_formation.nodes.progress.progress_node import Executable, ProgressParameters

@@ -66,17 +66,17 @@ class Topic:
     listeners: tuple[str, ...] = ()
 
     def of(self, robot: str = "") -> str:
-        """Name a robot's topic in full, or one of the formation itself (''), where the formation lies in the root."""
+        """Return the full name of a robot's topic ('': the formation's own), where the formation lies in the root."""
         return absolute(f"/{robot}", self.name)
 
 
 def follower(number: int) -> str:
-    """Name the n-th follower, counted from 1."""
+    """Return the name of the n-th follower, counted from 1."""
     return f"follower_{number}"
 
 
 def beacon_neighbour(robot: str) -> str:
-    """Name the robot on a follower's left, which it keeps its place beside.
+    """Return the name of the robot on a follower's left, which it keeps its place beside.
 
     Raises:
         FormationError: if the robot is no follower.
@@ -93,7 +93,7 @@ def under(prefix: str, name: str) -> str:
 
 
 def absolute(namespace: str, name: str) -> str:
-    """Name a topic or a namespace in full: in a namespace ('' or '/': the root), unless it is absolute already."""
+    """Return the full name of a topic or namespace: in a namespace ('' or '/': the root), unless it is absolute."""
     return name if name.startswith("/") else f"{namespace.rstrip('/')}/{name}"
 
 

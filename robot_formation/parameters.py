@@ -138,7 +138,7 @@ def _plain(value: object) -> object:
 
 
 def todays_names(values: Mapping[str, T], *, where: str = "parameters") -> dict[str, T]:
-    """Name parameters as today: values by dotted names, of which some may be former ones.
+    """Return parameters under their present names: values by dotted names, of which some may be former ones.
 
     Raises:
         ParameterError: if a parameter is given by both names.
@@ -153,7 +153,7 @@ def todays_names(values: Mapping[str, T], *, where: str = "parameters") -> dict[
 
 
 def no_parameter(name: str, known: Collection[str]) -> str:
-    """Say that there is no parameter of this name, and which one was probably meant."""
+    """Return a text that there is no parameter of this name, and which one was probably meant."""
     now = RENAMED.get(name, "")
     hint = f"; it is called '{now}' now" if now in known else suggestion(name, known)
     return f"no parameter '{name}'{hint}"
@@ -212,7 +212,7 @@ def from_mapping(cls: type[T], values: Mapping[str, object], *, where: str) -> T
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Say which known name was probably meant, whatever its case, or list what there is."""
+    """Return a text with the known name that was probably meant, whatever its case, or list what there is."""
     candidates = list(known)
     name = name[:_LONGEST_NAME]  # finding what is near takes the square of the length
     folded = {candidate.casefold(): candidate for candidate in reversed(candidates)}

@@ -43,12 +43,12 @@ def config_dir() -> Path:
 
 
 def default_bags_dir() -> Path:
-    """Say where runs are written unless told otherwise: the checkout's bags/, else ./bags (may not exist yet)."""
+    """Return where runs are written by default: the checkout's bags/, else ./bags (may not exist yet)."""
     return (project_root() or Path.cwd()) / "bags"
 
 
 def default_calibrations_dir() -> Path:
-    """Say where calibrations are written unless told otherwise: the checkout's calibrations/, else ./calibrations."""
+    """Return where calibrations are written by default: the checkout's calibrations/, else ./calibrations."""
     return (project_root() or Path.cwd()) / "calibrations"
 
 

@@ -41,10 +41,10 @@ class AlignmentMode(Protocol):
         """Begin a timestep: the neighbour has made its step (timestep 0: nobody has moved yet)."""
 
     def turn(self) -> float:
-        """Tell the turn [rad] to make with the prediction move."""
+        """Return the turn [rad] to make with the prediction move."""
 
     def moved(self, asked: Motion, motion: Motion) -> None:
-        """Take a move as it was asked for, and as the encoder wheels measured it."""
+        """Process a move: as commanded, and as the encoder wheels measured it."""
 
     def assess(self, frames: Frames) -> Decision:
         """Decide what a look calls for."""

@@ -28,7 +28,7 @@ def conditions(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, obje
 
 
 def conditions_text(found: Mapping[str, object]) -> str:
-    """Say the conditions in a line; what is unknown is left out, and so is what nearly every run has."""
+    """Describe the conditions in a line; what is unknown is left out, and so is what nearly every run has."""
     said = []
     if found.get("mode"):
         said.append(f"alignment {found['mode']}")

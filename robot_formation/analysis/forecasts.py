@@ -94,7 +94,7 @@ def error_statistics(errors_m: NDArray[np.float64], covariances_m2: NDArray[np.f
 
 
 def inside_ellipse(errors_m: NDArray[np.float64], covariances_m2: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell for each error (n, 2) whether it lies in the 90 % ellipse of its covariance (n, 2, 2): (n,).
+    """Return for each error (n, 2) whether it lies in the 90 % ellipse of its covariance (n, 2, 2): (n,).
 
     e^T C^-1 e <= q is the same as q C - e e^T having no negative eigenvalue (Schur complement), which needs no inverse
     and so holds for a covariance of zero too.

@@ -44,7 +44,7 @@ def load_run(path: str | Path, namespace: str | None = None) -> RunRecord:
 
 
 def run_record(bag: FormationBag) -> RunRecord:
-    """Take a run's record out of an open bag.
+    """Return the record of a run in an open bag.
 
     Raises:
         BagError: the bag is corrupted, or a topic has another message type than a run's.
@@ -67,7 +67,7 @@ def record_of(
     details: Mapping[str, str],
     stamps: Mapping[str, Sequence[int]] | None = None,
 ) -> RunRecord:
-    """Put a run's record together from its messages by absolute topic, in order; whoever read them, rosbags or ROS.
+    """Return a run's record made from its messages by absolute topic, in order; whoever read them, rosbags or ROS.
 
     Args:
         robots: the leader, then the followers by number.
@@ -155,7 +155,7 @@ def _robots(bag: FormationBag) -> list[str]:
 
 
 def run_topics(robots: Sequence[str]) -> dict[str, str]:
-    """Name the topics that the analysis reads, with their message types."""
+    """List the topics that the analysis reads, with their message types."""
     topics = {topic.of(): topic.type for topic in (names.SURFACE, names.left_plate(), names.OVERHEAD_POSES)}
     for robot in robots:
         odom = names.ground_truth_odom(robot)

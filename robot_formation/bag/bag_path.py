@@ -19,7 +19,7 @@ CUT_OFF_SUFFIX = ".cut_off"
 
 
 def recover_hint(partial_path: Path) -> str:
-    """Say how to save what is in a bag that could not be finished."""
+    """Describe how to save what is in a bag that could not be finished."""
     return f" ('formation recover {partial_path}' saves what was written)"
 
 
@@ -49,7 +49,7 @@ class PathReservation:
         self._socket: socket.socket | None = None
 
     def take(self) -> bool:
-        """Take the path; False if somebody has it. Entering it again later changes nothing.
+        """Reserve the path; return False if another process has it. Entering it again later changes nothing.
 
         Raises:
             BagError: this system doesn't let it be reserved, whoever has it.

@@ -110,7 +110,7 @@ def bag_name(path: str | Path) -> str:
 
 
 def storage_of(file: Path) -> str | None:
-    """Tell by its name which storage a file is: `.mcap` or `.db3`; None for other files."""
+    """Return which storage a file is by its name: `.mcap` or `.db3`; None for other files."""
     name = file.name.removesuffix(_PACKED)
     return next((kind for kind in _STORAGES if name.endswith(kind)), None)
 
@@ -153,12 +153,12 @@ def _mode(said: object) -> str:
 
 
 def _is_unclosed(files: Sequence[Path], path: Path, metadata: FolderMetadata | None) -> bool:
-    """Tell whether MCAP files were never closed by their writer."""
+    """Return whether MCAP files were never closed by their writer."""
     return (path.is_dir() and metadata is None) or any(_lacks_end(file) or not has_index(file) for file in files)
 
 
 def _lacks_end(file: Path) -> bool:
-    """Tell whether an MCAP file begins as one but doesn't end as one."""
+    """Return whether an MCAP file begins as one but doesn't end as one."""
     with open_file(file) as stream:
         head = stream.read(len(MAGIC))
         stream.seek(max(0, file.stat().st_size - len(MAGIC)))

@@ -17,7 +17,7 @@ class LossCounter:
         self._last: list[int] = []  # of each stream, the one continued last at the end
 
     def take(self, number: int, publishers: int) -> int:
-        """Take a message's number; return how many messages are missing before it.
+        """Process a message's number; return how many messages are missing before it.
 
         Args:
             number: the sequence number that its publisher gave it.

@@ -176,7 +176,7 @@ class McapSource(Source):
 
 
 def has_index(path: Path) -> bool:
-    """Tell whether an MCAP file has what `McapSource` needs; a damaged one has, for its damage has to be told."""
+    """Return whether an MCAP file has what `McapSource` needs; a damaged one has, for its damage has to be told."""
     with open_file(path) as stream:
         if stream.read(len(MAGIC)) != MAGIC:
             return True

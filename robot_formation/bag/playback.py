@@ -96,13 +96,13 @@ class Playhead:
         self.paused = False
 
     def time_ns(self, now_s: float) -> int:
-        """Tell the bag time at a wall time."""
+        """Return the bag time at a wall time."""
         if self.paused:
             return self._bag_ns
         return self._bag_ns + max(0, round((now_s - self._wall_s) * self._rate * 1e9))
 
     def wait_s(self, stamp_ns: int, now_s: float) -> float:
-        """Tell how long until a message is due: negative if it is late, infinite in a pause."""
+        """Return how long until a message is due: negative if it is late, infinite in a pause."""
         if self.paused:
             return math.inf
         return (stamp_ns - self._bag_ns) * 1e-9 / self._rate - (now_s - self._wall_s)
@@ -170,7 +170,7 @@ class Prefetch:
         self._thread.join()
 
     def next(self) -> RawMessage | None:
-        """Give the next message, None if there is none.
+        """Return the next message, None if there is none.
 
         Raises:
             BagError: the bag is corrupted.

@@ -269,7 +269,7 @@ def _merged(sources: Sequence[Source], metadata: FolderMetadata) -> list[TopicSu
 
 
 def _differences(path: Path, metadata: FolderMetadata, contents: Sequence[TopicSummary]) -> list[str]:
-    """Say if a folder's metadata count other messages than its files hold."""
+    """Warn if a folder's metadata count other messages than its files hold."""
     there = {topic.name: topic.message_count for topic in contents}
     names = [name for name in {**metadata.counts, **there} if metadata.counts.get(name, 0) != there.get(name, 0)]
     if not names:

@@ -109,7 +109,7 @@ def mcap_files(path: Path) -> list[Path]:
 
 
 def is_being_written(path: Path) -> bool:
-    """Tell whether a writer of this project has one of the bag's files open.
+    """Return whether a writer of this project has one of the bag's files open.
 
     Raises:
         BagError: as for `mcap_files`.

@@ -46,7 +46,7 @@ class Selection:
         return not self.topics and not self.regex
 
     def wants(self, topic: str, type_name: str) -> bool:
-        """Tell whether a topic is chosen.
+        """Return whether a topic is chosen.
 
         Args:
             topic: its absolute name.

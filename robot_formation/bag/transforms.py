@@ -48,12 +48,12 @@ class Transforms:
 
     @staticmethod
     def wants(topic: str, type_name: str) -> bool:
-        """Tell whether messages of a topic say where frames are."""
+        """Return whether messages of a topic say where frames are."""
         return _matched(topic, type_name) is not None
 
     @staticmethod
     def made_of(topic: str, type_name: str) -> dict[str, str]:
-        """Name the topics that are made of a topic's messages, absolute, with their types; none if it isn't used."""
+        """List the topics that are made of a topic's messages, absolute, with their types; none if it isn't used."""
         match = _matched(topic, type_name)
         return {} if match is None else made_in(match[1])
 
@@ -82,7 +82,7 @@ class Transforms:
 
 
 def made_in(namespace: str) -> dict[str, str]:
-    """Name the topics that are made for a formation in a namespace ('' or '/': the root), with their types."""
+    """List the topics that are made for a formation in a namespace ('' or '/': the root), with their types."""
     return {made.name: made.type for made in (_inside(namespace.rstrip("/"), t) for t in (names.TF, names.TF_STATIC))}
 
 

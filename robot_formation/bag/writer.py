@@ -281,7 +281,7 @@ class BagWriter:
             raise self._unwritable(error) from error
 
     def _unwritable(self, error: OSError) -> BagError:
-        """Give the bag up: what the disk has taken stays, to be recovered."""
+        """Abandon the bag: what is on the disk stays, to be recovered."""
         self._closed = True
         text = f"{self.path}: can't write the bag: {error.strerror or error}; free space or choose another path"
         if hasattr(self, "_file"):

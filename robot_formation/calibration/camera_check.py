@@ -35,7 +35,7 @@ def camera_values(fine_tuner: FineTunerParameters) -> dict[str, float]:
 
 
 def describe_camera(fine_tuner: FineTunerParameters) -> str:
-    """Say in a line of progress which calibration of the camera is used; empty without a file."""
+    """Describe in a line of progress which calibration of the camera is used; empty without a file."""
     path = fine_tuner.calibration_file
     return f"camera calibration: {origin(path, load_vision(path).measured_with)}" if path else ""
 

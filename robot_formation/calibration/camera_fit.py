@@ -103,7 +103,7 @@ class CameraFit:
         return _model(self._vector(), u, np.zeros_like(u), self.edge_m)[1]
 
     def alignment(self) -> dict[str, float]:
-        """Give the fine-tuner's parameters `alignment.*` that the curves determine."""
+        """Return the fine-tuner's parameters `alignment.*` that the curves determine."""
         return {
             "target_x_px": self.target_x_px,
             "slope_px_per_m": self.slope_px_per_m,
@@ -190,7 +190,7 @@ def pan_distances(views: Iterable[FaceView]) -> list[float]:
 
 
 def alone_range(views: Iterable[FaceView], u_m: float) -> tuple[float, float]:
-    """Tell how far behind and ahead, v [m], a follower at a distance u sees the Target face alone throughout."""
+    """Return how far behind and ahead, v [m], a follower at a distance u sees the Target face alone throughout."""
     ordered = sorted((view.v_m, view.alone) for view in views if view.u_m == u_m)
     ends = []
     for sign in (-1.0, 1.0):

@@ -104,7 +104,7 @@ def measure(position: Position, conditions: Conditions) -> list[CameraSample]:
 
 
 def stand(world: WorldNodeParameters, u_m: float, v_m: float, clockwise_deg: float) -> tuple[Pose, Pose]:
-    """Give the poses of neighbour and follower, about the plate's middle."""
+    """Return the poses of neighbour and follower, about the plate's middle."""
     return _bench(world, None).stand(u_m, v_m, clockwise_deg)
 
 
@@ -169,7 +169,7 @@ def _bench(world: WorldNodeParameters, detector: BlockDetectorNodeParameters | N
 
 
 def _until_steady(frames: Iterator[tuple[Block, ...]], look: LookParameters) -> Sequence[tuple[Block, ...]]:
-    """Take frames as the fine-tuner does: a look's number, and more while the last ones report different blocks."""
+    """Return the frames that the fine-tuner requests: a look's number, and more while the last ones differ."""
     reports = [next(frames) for _ in range(look.frames)]
     for _ in range(look.max_extensions):
         kinds = [

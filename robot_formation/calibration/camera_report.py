@@ -50,12 +50,12 @@ class VisionResult:
         return [place for place in places if place.angles == most]
 
     def distances(self) -> tuple[list[float], list[float]]:
-        """Give the distances u of the pan curves, and those of them that are compared."""
+        """Return the distances u of the pan curves, and those of them that are compared."""
         found = pan_distances(self.views)
         return found, compared_distances(found)
 
     def alone(self) -> dict[float, tuple[float, float]]:
-        """Give the range of v in which the Target block is seen alone, by distance u, m."""
+        """Return the range of v in which the Target block is seen alone, by distance u, m."""
         return {u: alone_range(self.views, u) for u in pan_distances(self.views)}
 
     def measured_difference_px(self, distances_m: Sequence[float]) -> float | None:

@@ -72,7 +72,7 @@ class Overlay:
 
 
 def kinds_of(sample: CameraSample) -> frozenset[Kind]:
-    """Tell what a look shows; Front and Rear together, which flicker can make, count as both."""
+    """Return what a look shows; Front and Rear together, which flicker can make, count as both."""
     seen = {block.signature for block in sample.blocks}
     found = {kind for kind, signature in ((Kind.FRONT, Face.FRONT), (Kind.REAR, Face.REAR)) if signature in seen}
     return frozenset(found or ({Kind.TARGET} if Face.TARGET in seen else ()))

@@ -53,7 +53,7 @@ def robot_curves(drive: DriveParameters, robots: Sequence[str]) -> dict[str, dic
 
 
 def describe_curves(drive: DriveParameters) -> str:
-    """Say in a line of progress which curves are used."""
+    """Describe in a line of progress which curves are used."""
     path = drive.calibration_file
     if not path:
         return "drive curves: one for all robots, by the parameters drive.calibration.*"
@@ -61,11 +61,11 @@ def describe_curves(drive: DriveParameters) -> str:
 
 
 def origin(path: str, measured_with: Mapping[str, object]) -> str:
-    """Name a calibration file and what it was measured with, as far as it says."""
+    """Describe a calibration file and what it was measured with, as far as it says."""
     said = [f"{name} {measured_with[name]}" for name in ("seed", "surface") if name in measured_with]
     return f"{path}{', measured with ' if said else ''}{', '.join(said)}"
 
 
 def differ(found: Sequence[str]) -> str:
-    """Name the first differences, and how many more there are."""
+    """List the first differences, and how many more there are."""
     return ", ".join(found[:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")

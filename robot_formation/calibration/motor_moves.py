@@ -74,7 +74,7 @@ def calibrate_motors(
 
 
 def curves(fits: Fits) -> MotorCalibration:
-    """Give the curves alone, as `drive` takes them."""
+    """Return the curves alone, as `drive` takes them."""
     return MotorCalibration({robot: {axis: fit.curve for axis, fit in axes.items()} for robot, axes in fits.items()})
 
 

@@ -11,7 +11,7 @@ Fits = Mapping[str, Mapping[str, AxisFit]]
 
 
 def unit_of(axis: str) -> str:
-    """Give the unit of an axis's travel."""
+    """Return the unit of an axis's travel."""
     return "rad" if axis == "turn" else "m"
 
 

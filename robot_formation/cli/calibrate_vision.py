@@ -148,7 +148,7 @@ def _print(args: argparse.Namespace, scenario: Scenario, result: VisionResult, f
 
 
 def conditions_of(scenario: Scenario) -> Conditions:
-    """Take the looks' conditions out of a scenario.
+    """Return the looks' conditions in a scenario.
 
     Raises:
         SignatureError: the taught signatures can't be read.

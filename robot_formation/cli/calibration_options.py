@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def build_scenario(args: argparse.Namespace, *, with_curves: bool) -> Scenario:
-    """Put the scenario together whose robots are measured, on the ground to measure on.
+    """Return the scenario whose robots are measured, on the ground to measure on.
 
     Without curves, the calibration files that it names are left out: they may be what is to be measured only now.
 

@@ -40,7 +40,7 @@ class Interrupts:
         self._leaving: int | None = None
 
     def install(self) -> None:
-        """Take the signals; those that came while they were blocked (./formation blocks them) come now."""
+        """Handle the signals from now on; those that were blocked before (by ./formation) come now."""
         signal_handling.take(self._take)
         sys.unraisablehook = self._unraisable
         signal.pthread_sigmask(signal.SIG_UNBLOCK, signal_handling.ENDING)

@@ -8,31 +8,10 @@ from collections.abc import Sequence
 
 import robot_formation
 from robot_formation import exit_codes
-from robot_formation.cli import (
-    analyze,
-    calibrate,
-    detect,
-    doctor,
-    info,
-    list_,
-    play,
-    predict,
-    record,
-    recover,
-    replay,
-    run,
-    sweep,
-    teach,
-    test,
-)
 from robot_formation.cli.interrupts import flush_or_forget_output, forget_output
 from robot_formation.cli.parser import Parser
+from robot_formation.cli.verbs import VERBS
 from robot_formation.errors import FormationError
-
-VERBS = (
-    *(run, sweep, list_, analyze, predict, record, play, info, recover, replay),
-    *(calibrate, teach, detect, doctor, test),
-)
 
 EPILOG = """\
 exit codes: 0 done, 2 usage or bad input, 3 leader lost or plate left, 4 a node died, 130 interrupted

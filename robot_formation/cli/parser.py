@@ -60,7 +60,7 @@ class Parser(argparse.ArgumentParser):
         return found, left
 
     def _refuse_unknown_options(self, words: Sequence[str]) -> None:
-        """Name a misspelt option before argparse misses an argument that it would have brought."""
+        """Report a misspelt option before argparse misses an argument that it would have brought."""
         options = list(_options(words, until_verb=self._subparsers is not None))
         if {"-h", "--help"} & set(options):
             return

@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[PredictorParameters]:
-    """Put each predictor's parameters together: config/, then the settings.
+    """Return each predictor's parameters: config/, then the settings.
 
     Raises:
         FormationError: naming what is misspelt, out of range or of another node.
@@ -173,7 +173,7 @@ def _default_picture(args: argparse.Namespace) -> Path:
 
 
 def _warn_of_bounds(log: DisplacementLog, parameters: PredictorParameters) -> None:
-    """Say if forecasts are cut to bounds that the log itself goes beyond."""
+    """Warn if forecasts are cut to bounds that the log itself goes beyond."""
     for axis, bound_m in enumerate((parameters.max_u_m, parameters.max_v_m)):
         beyond = int((abs(log.displacements_m[:, axis]) > bound_m).sum())
         if beyond:

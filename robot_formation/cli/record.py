@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def default_bag() -> PathReservation:
-    """Name a new bag after the time, and reserve the name."""
+    """Reserve a new bag name made from the time."""
     from robot_formation.bag.bag_path import reserve_new
     from robot_formation.paths import default_bags_dir
 

@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def default_out(bag: Path) -> Path:
-    """Name the new bag: that of a .partial folder gets the name it was to have."""
+    """Return the new bag's name: that of a .partial folder gets the name it was to have."""
     from robot_formation.bag.bag_path import PARTIAL_SUFFIX
     from robot_formation.bag.folder import bag_name
 

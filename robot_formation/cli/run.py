@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def build_scenario(args: argparse.Namespace) -> Scenario:
-    """Put the scenario together from preset or file and the options.
+    """Return the scenario made from preset or file and the options.
 
     Raises:
         FormationError: naming what is misspelt or out of range.

@@ -137,7 +137,7 @@ def _facts(plan: Plan) -> JsonObject:
 
 
 def _conditions_text(plan: Plan) -> str:
-    """Say under what conditions all runs were made: others give other figures."""
+    """Describe under what conditions all runs were made: others give other figures."""
     from robot_formation.analysis.conditions import conditions_text
 
     settings = f"; {', '.join(plan.settings)}" if plan.settings else ""
@@ -145,7 +145,7 @@ def _conditions_text(plan: Plan) -> str:
 
 
 def _announce(plan: Plan) -> None:
-    """Tell standard error which seeds are run, and if they are too few."""
+    """Print to standard error which seeds are run, and if they are too few."""
     print(seeds_text(plan.seeds), file=sys.stderr)
     if len(plan.seeds) < FEW_SEEDS:
         text = f"warning: intervals say nothing with fewer than {FEW_SEEDS} seeds; 20 are --seeds 0:20"
@@ -153,7 +153,7 @@ def _announce(plan: Plan) -> None:
 
 
 def seeds_text(chosen: Sequence[int]) -> str:
-    """Say seeds in words: '1 seed: 5', 'seeds 0 to 4 (5 seeds)', 'seeds 0 to 2, 7 (4 seeds)'."""
+    """Describe seeds in words: '1 seed: 5', 'seeds 0 to 4 (5 seeds)', 'seeds 0 to 2, 7 (4 seeds)'."""
     if len(chosen) == 1:
         return f"1 seed: {chosen[0]}"
     ranges: list[list[int]] = []
@@ -193,7 +193,7 @@ def _seeds(text: str) -> range:
 
 
 def default_folder() -> PathReservation:
-    """Name a new folder after the time, and reserve the name."""
+    """Reserve a new folder name made from the time."""
     from robot_formation.bag.bag_path import reserve_new
     from robot_formation.paths import default_bags_dir
 

@@ -40,7 +40,7 @@ class Place:
     formation: str = "/formation"
 
     def frame(self, name: str) -> str:
-        """Name one of the robot's frames."""
+        """Return the name of one of the robot's frames."""
         return f"{self.robot}/{name}" if self.robot else name
 
 
@@ -89,7 +89,7 @@ class Component:
         return {}
 
     def set_parameters(self, parameters: Any) -> None:
-        """Take changed parameters, an object of the component's parameter class, in which those `fixed` are as before.
+        """Apply changed parameters, an object of the component's parameter class, in which those `fixed` are as before.
 
         Raises:
             FormationError: to refuse them.
@@ -99,7 +99,7 @@ class Component:
         """Begin: called once after everything is connected."""
 
     def listened_to(self, topic: Topic, listeners: int) -> None:
-        """Take note of how many listen to an output that is worth making only for somebody."""
+        """Register how many listen to an output that is worth making only for somebody."""
 
     @property
     def busy(self) -> bool:
@@ -113,7 +113,7 @@ class Component:
         """Do something about it that nothing comes any more."""
 
     def close(self) -> None:
-        """Give back what the component holds; called once, at the end."""
+        """Release what the component holds; called once, at the end."""
 
     def health(self) -> Health:
         """Report what /diagnostics shows; by default the last warning."""

@@ -37,14 +37,14 @@ class OverheadView:
         send(names.OVERHEAD_INFO, info)
 
     def after(self, events: Sequence[Event], world: World, send: Send) -> None:
-        """Take a picture if these events ended the last motion."""
+        """Render a picture if these events ended the last motion."""
         if self._camera is None or not world.at_rest:
             return
         if any(isinstance(event, RobotPose) and event.final for event in events):
             self.look(world, send)
 
     def look(self, world: World, send: Send) -> None:
-        """Take a picture of the robots where they are now."""
+        """Render a picture of the robots where they are now."""
         if self._camera is None:
             return
         poses = [world.ground_truth(robot).pose for robot in world.robots]

@@ -25,7 +25,7 @@ class Trail(Generic[T]):
         self._new = 0
 
     def add(self, place_m: Sequence[float], pose: T) -> list[T] | None:
-        """Take a pose; return the path to send, the newest pose at its end, or None if it need not be sent now.
+        """Add a pose; return the path to send, the newest pose at its end, or None if it need not be sent now.
 
         Args:
             place_m: where the robot is: x, y, z in metres.

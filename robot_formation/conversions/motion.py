@@ -129,7 +129,7 @@ def read_displacement(message: PoseWithCovarianceStamped) -> Motion:
 
 
 def has_estimate(message: PoseWithCovarianceStamped) -> bool:
-    """Tell whether a displacement was estimated at all."""
+    """Return whether a displacement was estimated at all."""
     return float(message.pose.covariance[0]) >= 0.0
 
 
@@ -161,7 +161,7 @@ def body_odometry(
 
 
 def pose_of(odometry_message: Odometry) -> PoseStamped:
-    """Take the pose out of an odometry message."""
+    """Return the pose of an odometry message."""
     return PoseStamped(header=odometry_message.header, pose=odometry_message.pose.pose)
 
 

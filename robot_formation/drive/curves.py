@@ -45,7 +45,7 @@ class MotorCalibration:
     measured_with: Mapping[str, Json] = field(default_factory=dict)
 
     def differences(self, facts: Mapping[str, Json]) -> list[str]:
-        """Name the facts that this calibration was measured with other values of; unknown names are no difference."""
+        """List the facts that this calibration was measured with other values of; unknown names are no difference."""
         return differences(self.measured_with, facts)
 
 
@@ -55,7 +55,7 @@ def limits(parameters: DriveParameters) -> dict[str, float]:
 
 
 def calibrated(parameters: DriveParameters, robot: str) -> DriveParameters:
-    """Put a robot's own curves into its drive's parameters, if they name a calibration file.
+    """Return a drive's parameters with its robot's own curves, if they name a calibration file.
 
     The file goes before `calibration`, axis by axis; an axis that the file lacks keeps `calibration`'s curve.
 
@@ -112,7 +112,7 @@ def read_sections(path: str | Path, section: str, *, what: str, verb: str) -> tu
 
 
 def differences(measured_with: Mapping[str, Json], facts: Mapping[str, Json]) -> list[str]:
-    """Name the facts that a calibration was measured with other values of; unknown names are no difference."""
+    """List the facts that a calibration was measured with other values of; unknown names are no difference."""
     return [
         f"{name} {measured_with[name]} instead of {value}"
         for name, value in facts.items()

@@ -118,7 +118,7 @@ class Drive:
     def joint_states(
         self, stamp_ns: int, positions: Sequence[float], velocities: Sequence[float], number: str = ""
     ) -> DriveAction:
-        """Take the six joints' positions [rad] and velocities [rad/s]; all velocities zero means at rest.
+        """Process the six joints' positions [rad] and velocities [rad/s]; all velocities zero means at rest.
 
         Joints are ordered as `names.JOINTS`. Non-finite values must have been refused before. `number` is that of the
         command that the report answers; a robot whose firmware doesn't tell leaves it empty.

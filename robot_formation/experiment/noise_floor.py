@@ -110,7 +110,7 @@ class TargetFace:
 
 
 def _changed(commanded: Message, change: Motion) -> Message:
-    """Tell the predictor of the move that was commanded in place of its own: it learns the robot's bias from it."""
+    """Report to the predictor the move that was commanded in place of its own: it learns the robot's bias from it."""
     if not conversions.has_estimate(commanded):
         return commanded
     motion = conversions.read_displacement(commanded)

@@ -105,14 +105,14 @@ class Progress:
         return all(self._heard[robot].told >= self._timesteps for robot in self._followers)
 
     def listen(self, topic: str, message: Message) -> None:
-        """Take a message; others than those of `topics` are ignored."""
+        """Process a message; others than those of `topics` are ignored."""
         handler = self._handlers.get(topic)
         if handler is not None:
             handler(message)
             self._tell()
 
     def remind(self) -> None:
-        """Say what goes on between two timesteps, for a run in which one takes long."""
+        """Print what happens between two timesteps, for a run in which one takes long."""
         for robot in self._followers:
             heard = self._heard[robot]
             doing = f" ({heard.state})" if heard.state else ""
@@ -144,7 +144,7 @@ class Progress:
                 pass
 
     def _tell_next(self, robot: str) -> bool:
-        """Say the robot's next timestep if everything of it has arrived."""
+        """Print the robot's next timestep if everything of it has arrived."""
         heard, leader = self._heard[robot], self._heard[names.LEADER]
         timestep = heard.told + 1
         if len(leader.moves) < timestep:

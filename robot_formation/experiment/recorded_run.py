@@ -48,7 +48,7 @@ class Recording:
             self.notes.append("the bag doesn't tell the nodes' parameters: those of config/ are taken")
 
     def has(self, robot: str, topic: names.Topic) -> bool:
-        """Tell whether there are messages on a robot's topic."""
+        """Return whether there are messages on a robot's topic."""
         return topic.of(robot) in self._bag.topics
 
     def messages(self, robot: str, topic: names.Topic) -> Iterator[Message]:
@@ -108,7 +108,7 @@ def handlers(component: Component) -> dict[str, Callable[[Message], None]]:
 
 
 def equal(recorded: Sequence[Message], today: Sequence[Message]) -> bool:
-    """Tell whether two sequences of messages have the same values.
+    """Return whether two sequences of messages have the same values.
 
     Not their serialised form: what lies between its fields is not defined.
     """
@@ -116,7 +116,7 @@ def equal(recorded: Sequence[Message], today: Sequence[Message]) -> bool:
 
 
 def _changes(recorded: dict[str, str]) -> list[str]:
-    """Say which versions were others when the bag was recorded."""
+    """Describe which versions were others when the bag was recorded."""
     today = {**versions(), "commit": git_commit()}
     return [
         f"recorded with {name} {recorded[name]!s:.60}, now {today[name] or 'unknown'}"

@@ -154,7 +154,7 @@ class _Driver:
         return self._component.details()["waiting for"]
 
     def _feed(self, script: _Script) -> bool:
-        """Give it one message; return whether there was one."""
+        """Process one message; return whether there was one."""
         waits_for = self._waits_for
         if waits_for == "move":
             self._repeat.clear()
@@ -199,7 +199,7 @@ def _moves(state: str) -> bool:
 
 
 def _split(sent: dict[str, list[Message]]) -> list[Decisions]:
-    """Tell the timesteps apart: each begins with a state of its own, and moves go with the states that send one."""
+    """Split into timesteps: each begins with a state of its own, and moves go with the states that send one."""
     moves = deque(conversions.read_move(message) for message in sent[names.MOVE.name])
     found: list[tuple[list[str], list[Motion]]] = []
     for message in sent[names.ALIGNMENT.name]:

@@ -315,7 +315,7 @@ def with_values(scenario: Scenario, values: Sequence[tuple[str, object]], *, sou
 
 
 def with_surface(scenario: Scenario, surface: str) -> Scenario:
-    """Put the scenario on another surface with that surface's own defaults."""
+    """Return the scenario on another surface with that surface's own defaults."""
     if surface not in SURFACES:
         raise ParameterError(f"no surface '{surface}'{suggestion(surface, SURFACES)}")
     scenario = with_value(scenario, "world.surface", surface)

@@ -210,7 +210,7 @@ class Table:
 
 
 def _difference(earlier: Sequence[str], now: Sequence[str]) -> str:
-    """Say which settings of an earlier sweep differ from those of now."""
+    """Describe which settings of an earlier sweep differ from those of now."""
     gone = [setting for setting in earlier if setting not in now]
     new = [setting for setting in now if setting not in earlier]
     said = [f"it was made with --set {' --set '.join(gone)}"] if gone else []

@@ -41,7 +41,7 @@ class VisionCalibration:
 
 
 def calibrated(parameters: T) -> T:
-    """Put the camera's calibration into a fine-tuner's parameters, if they name a calibration file.
+    """Return a fine-tuner's parameters with the camera's calibration, if they name a calibration file.
 
     The file goes before `alignment`, value by value; a value that the file lacks keeps `alignment`'s.
 

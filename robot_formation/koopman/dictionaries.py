@@ -153,7 +153,7 @@ class Monomials(Observables):
     """Products of powers of the state's components, one for each row of exponents, in the order given."""
 
     def __init__(self, exponents: Sequence[Sequence[int]], variables: Sequence[str] | None = None) -> None:
-        """Take exponents (k, n): integers, zero or positive.
+        """Set exponents (k, n): integers, zero or positive.
 
         Raises:
             KoopmanError: if they are something else.
@@ -212,7 +212,7 @@ class Rows(Observables):
     """A dictionary of some components only: its state is made of the given rows of a longer one."""
 
     def __init__(self, dictionary: Dictionary, rows: Sequence[int], dimension: int) -> None:
-        """Take rows 0..dimension-1, as many as the dictionary's states are long.
+        """Set rows 0..dimension-1, as many as the dictionary's states are long.
 
         Raises:
             KoopmanError: on other rows.

@@ -124,7 +124,7 @@ class OnlineDMD(RecursiveFit):
         return float(np.linalg.cond(self._r) if self._p is None else np.sqrt(np.linalg.cond(self._p)))
 
     def update(self, x: ArrayLike, y: ArrayLike) -> Vector:
-        """Take one measured pair; return the innovation y - K x of the K before the update, shape (outputs,).
+        """Update with one measured pair; return the innovation y - K x of the K before the update, shape (outputs,).
 
         Raises:
             KoopmanError: on a wrong shape, or a value that is not finite or beyond 1e100; nothing is learned then.

@@ -34,7 +34,7 @@ class RadialBasis(Observables):
     """
 
     def __init__(self, centres: ArrayLike, kind: str = "gaussian", *, width: float = 1.0) -> None:
-        """Take centres (n, k), one per column, and a width in the units of the state.
+        """Set centres (n, k), one per column, and a width in the units of the state.
 
         Raises:
             KoopmanError: on centres that are not finite, an unknown kind or a width that is not positive.

@@ -71,7 +71,7 @@ class WindowedDMD(RecursiveFit):
         return float(self._singular[0] / self._singular[-1]) if self.started else float("inf")
 
     def update(self, x: ArrayLike, y: ArrayLike) -> Vector:
-        """Take one measured pair and drop the oldest of a full window.
+        """Update with one measured pair and drop the oldest of a full window.
 
         Returns:
             The innovation y - K x of the K before the update, shape (outputs,).

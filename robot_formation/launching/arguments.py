@@ -49,7 +49,7 @@ ARGUMENTS = {
 
 
 def scenario_of(values: Mapping[str, str]) -> Scenario:
-    """Put the scenario together that the arguments describe.
+    """Return the scenario that the arguments describe.
 
     Raises:
         FormationError: naming the argument that is wrong.
@@ -101,13 +101,13 @@ def is_true(text: str) -> bool:
 
 
 def discovery(argument: str, environment: Mapping[str, str]) -> dict[str, str]:
-    """Tell which variables the nodes need so that those find them who should: the argument, else what is exported."""
+    """Return which variables the nodes need so that those find them who should: the argument, else what is exported."""
     wanted = argument or ("" if environment.get(RANGE) else "LOCALHOST")
     return {RANGE: wanted} if wanted else {}
 
 
 def viewer_environment(given: Mapping[str, str], exported: Mapping[str, str]) -> dict[str, str]:
-    """Tell which variables a viewer needs; our nodes bind themselves to the loopback interface, it can't.
+    """Return which variables a viewer needs; our nodes bind themselves to the loopback interface, it can't.
 
     Args:
         given: what the nodes are given.
@@ -119,7 +119,7 @@ def viewer_environment(given: Mapping[str, str], exported: Mapping[str, str]) ->
 
 
 def rviz_config() -> Path:
-    """Name the file of the viewer's displays."""
+    """Return the file of the viewer's displays."""
     return config_dir() / "formation.rviz"
 
 

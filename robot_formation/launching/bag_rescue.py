@@ -49,7 +49,7 @@ def rescue(bag: Path) -> tuple[Path | None, str]:
 
 
 def missing_messages(bag: Path) -> str:
-    """Say in a line which messages the bag's recorder knows it didn't get; nothing if there are none.
+    """Describe in a line which messages the bag's recorder knows it didn't get; nothing if there are none.
 
     Raises:
         BagError: the bag can't be read.

@@ -89,7 +89,7 @@ class Child:
 
     @property
     def death(self) -> str:
-        """Say how it ended."""
+        """Describe how it ended."""
         code = self.exit_code or 0
         how = manner(code)
         lines = self._text().strip().splitlines()

@@ -13,7 +13,7 @@ _WORDS = {exit_codes.DONE: "done", exit_codes.LOST: "lost", exit_codes.INTERRUPT
 
 
 def verdict(executable: str, code: int) -> int:
-    """Tell a run's exit code from that of the node that ended first (negative: the signal that killed it)."""
+    """Return a run's exit code from that of the node that ended first (negative: the signal that killed it)."""
     if code == exit_codes.DONE and executable == "leader":
         return exit_codes.DONE
     if code == exit_codes.LOST and executable in ("fine_tuner", "world"):
@@ -22,7 +22,7 @@ def verdict(executable: str, code: int) -> int:
 
 
 def recorder_failed(executable: str, code: int | None) -> bool:
-    """Tell whether a node is a recorder that did not end well (None: not at all).
+    """Return whether a node is a recorder that did not end well (None: not at all).
 
     It has work to do after the run's end: without its bag the run has not been what was asked for.
     """
@@ -30,7 +30,7 @@ def recorder_failed(executable: str, code: int | None) -> bool:
 
 
 def manner(code: int) -> str:
-    """Say how a process ended."""
+    """Describe how a process ended."""
     return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
 
 
@@ -52,7 +52,7 @@ class LaunchedRun:
     _ended: int = field(default=0, init=False)
 
     def ended(self, name: str, executable: str, code: int, *, stopping: bool) -> bool:
-        """Take note of a process's end; return whether the run ends with it, so that its others have to end too.
+        """Register a process's end; return whether the run ends with it, so that its others have to end too.
 
         Args:
             name: the node's, for people.
@@ -83,7 +83,7 @@ class LaunchedRun:
         return self.complete and self.exit_code not in (exit_codes.DONE, exit_codes.INTERRUPTED)
 
     def __str__(self) -> str:
-        """Say how the run ended, in one line."""
+        """Describe how the run ended, in one line."""
         word = _WORDS.get(exit_codes.NODE_DIED if self.exit_code is None else self.exit_code, "incomplete")
         why = f" ({self.reason})" if self.reason else ""
         return f"outcome: {word}{why}" + (f", bag {self.bag}" if self.bag else "")

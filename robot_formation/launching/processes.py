@@ -33,7 +33,7 @@ class Process:
         return _inside(self.namespace, self.executable)
 
     def ros_parameters(self) -> JsonObject:
-        """Give the parameters as a ROS parameter file holds them: no empty lists, ROS can't tell their type."""
+        """Return the parameters as a ROS parameter file holds them: no empty lists, ROS can't tell their type."""
         return {name: value for name, value in self.parameters.items() if value != []}
 
 
@@ -80,7 +80,7 @@ def progress(scenario: Scenario, namespace: str) -> Process:
 
 
 def _inside(namespace: str, robot: str) -> str:
-    """Name a robot's namespace ('': the formation's own) in that of its formation."""
+    """Return a robot's namespace ('': the formation's own) in that of its formation."""
     if not robot:
         return namespace
     return f"{namespace.rstrip('/')}/{robot}" if namespace else robot

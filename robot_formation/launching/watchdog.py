@@ -55,7 +55,7 @@ class Watchdog:
         return self._clock() - self._looked_at >= _EVERY_S
 
     def look(self, states: Mapping[str, str], reports: Mapping[str, int], events: int) -> str:
-        """Take note of how the nodes are; say which one hangs, nothing while none does.
+        """Update with the state of the nodes; return the name of one that hangs, with the reason, or an empty text.
 
         Args:
             states: of each node's process, the letter of /proc/PID/stat.
@@ -97,6 +97,6 @@ class Watchdog:
 
 
 def stopped_text(node: str, seconds: float | None = None) -> str:
-    """Say that a node's process is stopped."""
+    """Return the text that a node's process is stopped."""
     since = "" if seconds is None else f" for {seconds:.0f} s"
     return f"node {node} was stopped{since} (process state {STOPPED}: SIGSTOP or the like)"

@@ -60,7 +60,7 @@ class Leader:
         return LeaderAction(done=0)
 
     def follower_done(self, follower: str, timestep: int) -> LeaderAction:
-        """Take a follower's tick; the last missing one starts the next timestep or ends the tour."""
+        """Process a follower's tick; the last missing one starts the next timestep or ends the tour."""
         if follower not in self._ready or timestep != self._ready[follower] + 1:
             return NOTHING
         self._ready[follower] = timestep

@@ -83,7 +83,7 @@ def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> li
 
 
 def is_of_domain(group: str, domain: int | None) -> bool:
-    """Tell whether a group may be one of this domain: a segment, a port of the domain, or one that all share."""
+    """Return whether a group may be one of this domain: a segment, a port of the domain, or one that all share."""
     match = _NAME.fullmatch(group)
     if domain is None or match is None or match["port"] is None:
         return True

@@ -37,7 +37,7 @@ def png_head(content: bytes) -> PngHead | None:
 
 
 def is_whole(content: bytes) -> bool:
-    """Tell whether all chunks are there and have their check sums; OpenCV would fill what is missing with black."""
+    """Return whether all chunks are there and have their check sums; OpenCV would fill what is missing with black."""
     kind = b""
     for kind, data, check_sum in _chunks(content):
         if zlib.crc32(data, zlib.crc32(kind)) != check_sum:
@@ -46,7 +46,7 @@ def is_whole(content: bytes) -> bool:
 
 
 def unpacks_within(content: bytes, most_bytes: int) -> bool:
-    """Tell whether the pixels unpack to no more than so many bytes; what a library would work through in vain."""
+    """Return whether the pixels unpack to no more than so many bytes; what a library would work through in vain."""
     unpacker = zlib.decompressobj()
     size = 0
     for kind, data, _ in _chunks(content):

@@ -7,7 +7,7 @@ import socket
 
 
 def reserve(name: str) -> socket.socket | None:
-    """Take a name by an abstract Unix socket: taken in one step, gone with its process, and no file is left.
+    """Reserve a name by an abstract Unix socket: reserved in one step, gone with its process, and no file is left.
 
     Returns:
         What keeps the name until it is closed; None if another has it.

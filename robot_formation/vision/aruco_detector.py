@@ -65,7 +65,7 @@ class BlockSensor(Protocol):
     """What turns pictures into tracked blocks: signatures 1, 2 and 3 are the Target, Front and Rear faces."""
 
     def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
-        """Take the next frame, RGB (208, 316, 3) uint8 at a time in microseconds, and report the tracked blocks.
+        """Process the next frame, RGB (208, 316, 3) uint8 at a time in microseconds, and report the tracked blocks.
 
         Raises:
             PictureError: if the picture has another shape or type.

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from robot_formation.geometry.orientation import quaternion
 from robot_formation.names import JOINTS
 from robot_formation.surface import Surface
-from robot_formation.world.body import Body
+from robot_formation.world.body_and_traction import Body
 from robot_formation.world.events import JointStates
 from robot_formation.world.imperfections import draw_imperfections, generator
 from robot_formation.world.parameters import DriveMode, WorldParameters
@@ -110,7 +110,7 @@ class Robot:
         return (common * flaws.stop_common_m / radius, *(value * flaws.stop_wheel_m / radius for value in own))
 
     def brake(self) -> None:
-        """Give the running motion up."""
+        """Abort the running motion."""
         for wheel in self.body.wheels:
             wheel.brake()
 

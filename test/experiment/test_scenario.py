@@ -22,7 +22,7 @@ from robot_formation.experiment.scenario import (
     with_option,
     with_surface,
 )
-from robot_formation.experiment.scenario_schema import scenario_schema
+from robot_formation.experiment.scenario_json_schema import scenario_schema
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.koopman.predictors import NAMES, PredictorParameters
 from robot_formation.parameters import from_mapping, specs, to_mapping

@@ -10,7 +10,7 @@ import pytest
 
 from repository import PACKAGE, ROOT
 from robot_formation import names
-from robot_formation.cli.main import VERBS
+from robot_formation.cli.verbs import VERBS
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import load_track

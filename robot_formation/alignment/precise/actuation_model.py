@@ -78,7 +78,7 @@ class ActuationModel:
         return Motion.from_legs(turn, self._longer("v", forward), self._longer("u", left))
 
     def moved(self, asked: Motion, motion: Motion) -> None:
-        """Take a move as it was asked for and as it was measured."""
+        """Process a move: as commanded and as measured."""
         turn = asked.yaw_rad
         sent, got = into_frame(asked.x_m, asked.y_m, turn), into_frame(motion.x_m, motion.y_m, turn)
         if self._wanted is not None:

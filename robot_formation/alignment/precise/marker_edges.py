@@ -131,22 +131,22 @@ class EdgeParameters:
         return target.width >= self.clear_ratio * target.height
 
     def front_band(self, width_px: float) -> int:
-        """Tell which values hold for a Front block of this reported width."""
+        """Return which values hold for a Front block of this reported width."""
         return bisect_right(self.front_widths_px, width_px)
 
     def rear_band(self, width_px: float) -> int:
-        """Tell which values hold for a Rear block of this reported width."""
+        """Return which values hold for a Rear block of this reported width."""
         return bisect_right(self.rear_widths_px, width_px)
 
     def front_right(self, front: FaceBox, target: FaceBox | None) -> tuple[float, float]:
-        """Tell bias and scatter of the Front block's right edge, px."""
+        """Return bias and scatter of the Front block's right edge, px."""
         if not self.clear(target):
             return self.rough_front_right_px, self.rough_sigma_px
         band = self.front_band(front.width)
         return self.front_right_px[band], self.front_right_sigma_px[band]
 
     def rear_left(self, rear: FaceBox, target: FaceBox | None) -> tuple[float, float]:
-        """Tell bias and scatter of the Rear block's left edge, px."""
+        """Return bias and scatter of the Rear block's left edge, px."""
         if not self.clear(target):
             return self.rough_rear_left_px, self.rough_sigma_px
         band = self.rear_band(rear.width)
@@ -205,7 +205,7 @@ def _mean(boxes: Sequence[FaceBox]) -> FaceBox:
 
 
 def view(boxes: dict[Face, FaceBox], p: EdgeParameters) -> View:
-    """Take the edges that can be trusted out of a look's boxes.
+    """Return the edges of a look's boxes that can be trusted.
 
     Where two faces meet, the one on the right tells the common edge: the detector's rows are exact there only. The
     rows are those of the widest face: a sliver is often broken up in height.

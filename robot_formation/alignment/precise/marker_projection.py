@@ -117,11 +117,11 @@ class MarkerModel:
         return np.asarray(end + (other - end) * np.minimum(1.0, self.parameters.row_inset_px / np.maximum(width, 1.0)))
 
     def widths(self, state: Vector) -> dict[Face, float]:
-        """Tell how wide each face appears, px; negative if it is turned away."""
+        """Return how wide each face appears, px; negative if it is turned away."""
         return self.shown(state, (-math.inf, math.inf))
 
     def shown(self, state: Vector, limits_px: tuple[float, float]) -> dict[Face, float]:
-        """Tell how much of each face's width lies between two columns, px; negative if it is turned away."""
+        """Return how much of each face's width lies between two columns, px; negative if it is turned away."""
         columns = np.clip(self.pixels(state[None])[0, :, 0], *limits_px)
         middle = {edge: float(columns[corners].mean()) for edge, corners in _CORNERS.items()}
         return {face: middle[face, "right"] - middle[face, "left"] for face in Face}

@@ -182,7 +182,7 @@ class PoseFilter:
         self.hypotheses = []
 
     def assume_heading(self, sigma_rad: float) -> None:
-        """Take for known that the neighbour heads as the follower does, up to a standard deviation."""
+        """Condition on the assumption that the neighbour heads as the follower does, up to a standard deviation."""
         row = np.zeros((1, SIZE))
         row[0, YAW] = 1.0
         for hypothesis in self.hypotheses:
@@ -194,7 +194,7 @@ class PoseFilter:
     # --- moves ------------------------------------------------------------------------------------------------------
 
     def moved(self, motion: Motion) -> None:
-        """Take a move of the follower as its encoders measured it."""
+        """Predict (EKF time update) by a move of the follower, as its encoders measured it."""
         p = self._p
         length = math.hypot(motion.x_m, motion.y_m)
         # The turn comes first: its error swings the way that follows.
@@ -219,7 +219,7 @@ class PoseFilter:
         hypothesis.covariance = jacobian @ hypothesis.covariance @ jacobian.T + swing @ noise @ swing.T
 
     def neighbour_stepped(self, step: Motion, overshoot: float = 0.0, sidestep_sigma_m: float | None = None) -> None:
-        """Take that the neighbour has made a step of about this size in its own frame.
+        """Predict (EKF time update) that the neighbour has made a step of about this size in its own frame.
 
         Args:
             step: its way ahead, and aside if it slips as the follower does.
@@ -255,7 +255,7 @@ class PoseFilter:
     # --- looks ------------------------------------------------------------------------------------------------------
 
     def look(self, boxes: dict[Face, FaceBox]) -> None:
-        """Take a look's boxes, at least one."""
+        """Update (EKF measurement update) by a look's boxes, at least one."""
         if self._stepped and self.hypotheses:
             self._nis += _NIS_GAIN * (self.nis(boxes) - self._nis)
         self._stepped = False

@@ -125,14 +125,14 @@ class PreciseAlignment:
             )
 
     def turn(self) -> float:
-        """Tell the turn [rad] to make with the prediction move."""
+        """Return the turn [rad] to make with the prediction move."""
         if not self._filter.known:
             return 0.0
         heading = pose_of(self._filter.best.state).then(self._formation).yaw_rad
         return heading if abs(heading) > self._p.turn_rad else 0.0
 
     def moved(self, asked: Motion, motion: Motion) -> None:
-        """Take a measured move."""
+        """Process a measured move."""
         self._filter.moved(motion)
         self._actuation.moved(asked, motion)
         self._last = motion

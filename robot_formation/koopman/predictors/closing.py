@@ -54,7 +54,7 @@ class ResidualFilter:
         """Weight of each filter for each axis, (filters, axes)."""
 
     def observe(self, total: Vector, residual: Vector | None) -> None:
-        """Take the total displacement (2,) of a timestep and the camera's residual (2,), None if it saw none."""
+        """Update with the total displacement (2,) of a timestep and the camera's residual (2,), None if it saw none."""
         means = self._means @ _ONWARD.T
         means[..., 0] -= total
         covariances = _ONWARD @ self._covariances @ _ONWARD.T
@@ -87,7 +87,7 @@ class ResidualFilter:
         return np.asarray((self.weights * self._means[..., 1]).sum(axis=0))
 
     def state(self) -> JsonObject:
-        """Take all that it has learned."""
+        """Return all that it has learned."""
         return {
             "means": self._means.tolist(),
             "covariances": self._covariances.tolist(),
@@ -95,7 +95,7 @@ class ResidualFilter:
         }
 
     def restore(self, state: Mapping[str, Json]) -> None:
-        """Put back what `state` took."""
+        """Restore what `state` returned."""
         self._means = array(state["means"], *self._means.shape)
         self._covariances = covariance(state["covariances"], *self._covariances.shape)
         self._losses = array(state["losses"], *self._losses.shape)
@@ -108,7 +108,7 @@ class Closing:
     def __init__(
         self, parameters: ClosingParameters, model: Model, judge: Callable[[Vector], None] | None = None
     ) -> None:
-        """Put the closing around a model; `judge` is told every w as the camera saw it, before the model gets it."""
+        """Wrap a model in residual feedback; `judge` is told every w as the camera saw it, before the model gets it."""
         self._model = model
         self._judge = judge
         self._filter = ResidualFilter(parameters)
@@ -117,7 +117,7 @@ class Closing:
         self._seen = False
 
     def observe(self, displacement: Vector, residual: Vector | None, commanded: Vector | None) -> None:
-        """Take a timestep's total displacement, the camera's residual and what was commanded, where they are known."""
+        """Update with a timestep's total displacement, the camera's residual and the command, where they are known."""
         if commanded is not None:
             bias = displacement - commanded
             if np.abs(bias).max() <= _LARGEST_BIAS_M:
@@ -148,7 +148,7 @@ class Closing:
         return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
 
     def state(self) -> JsonObject:
-        """Take all that it has learned."""
+        """Return all that it has learned."""
         return {
             "model": self._model.state(),
             "filter": self._filter.state(),
@@ -157,7 +157,7 @@ class Closing:
         }
 
     def restore(self, state: Mapping[str, Json]) -> None:
-        """Put back what `state` took."""
+        """Restore what `state` returned."""
         self._model.restore(state["model"])
         self._filter.restore(state["filter"])
         self._bias.restore(state["bias"])

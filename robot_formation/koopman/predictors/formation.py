@@ -30,7 +30,7 @@ class Mixture:
         self._begun = False
 
     def judge(self, w: Vector) -> None:
-        """Take w of a timestep as the camera saw it, before it is filtered, to tell how good the forecasts were."""
+        """Process w of a timestep as the camera saw it, before it is filtered, to tell how good the forecasts were."""
         if self._begun:
             self._losses = self._p.discount * self._losses + 0.5 * ((self._forecasts() - w) / self._scale) ** 2
 

@@ -38,7 +38,7 @@ class Model(Protocol):
     """A one-step model: it is shown each displacement once, in order, and forecasts the next."""
 
     def observe(self, x: Vector) -> None:
-        """Take the measured displacement (2,) of a timestep."""
+        """Update with the measured displacement (2,) of a timestep."""
 
     def forecast(self) -> Vector:
         """Forecast the next displacement (2,); called after at least one observation."""
@@ -47,10 +47,10 @@ class Model(Protocol):
         """Show K and its quality where the model has them."""
 
     def state(self) -> JsonObject:
-        """Take all that it has learned, as numbers, lists and None."""
+        """Return all that it has learned, as numbers, lists and None."""
 
     def restore(self, state: Mapping[str, Json]) -> None:
-        """Put back what `state` took from a model with the same parameters."""
+        """Restore what `state` returned from a model with the same parameters."""
 
 
 class Previous:
@@ -129,7 +129,7 @@ class TrendFilter:
         self._covariance = np.diag([sigma_m**2, self._p.start_trend_m**2])
 
     def observe(self, x: Vector) -> None:
-        """Take a value (2,); the first one is the level if there was no prior."""
+        """Update with a value (2,); the first one is the level if there was no prior."""
         noise = self._p.noise_m**2
         if self._state is None:
             self._state = np.stack([x, np.zeros(2)])
@@ -148,14 +148,14 @@ class TrendFilter:
         return np.zeros(2) if self._state is None else self._state[0].copy()
 
     def state(self) -> JsonObject:
-        """Take all that it has learned."""
+        """Return all that it has learned."""
         return {
             "state": None if self._state is None else self._state.tolist(),
             "covariance": self._covariance.tolist(),
         }
 
     def restore(self, state: Mapping[str, Json]) -> None:
-        """Put back what `state` took."""
+        """Restore what `state` returned."""
         self._state = None if state["state"] is None else array(state["state"], 2, 2)
         self._covariance = covariance(state["covariance"], 2, 2)
 

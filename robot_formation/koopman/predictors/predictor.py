@@ -114,7 +114,7 @@ class Predictor:
         return self.parameters.name
 
     def observe(self, displacement: Vector, residual: Vector | None = None, commanded: Vector | None = None) -> None:
-        """Take a finished timestep: total displacement (2,), camera residual (2,), commanded displacement (2,).
+        """Update with a finished timestep: total displacement (2,), camera residual (2,), commanded displacement (2,).
 
         `commanded` is what the total would have been had the prediction move gone as commanded.
 
@@ -163,7 +163,7 @@ class Predictor:
         return Forecast(mean, np.array(((self._uu / self._weight, uv), (uv, self._vv / self._weight))), command)
 
     def state(self) -> JsonObject:
-        """Take all that it has learned, as numbers, lists, text and None (JSON)."""
+        """Return all that it has learned, as numbers, lists, text and None (JSON)."""
         return {
             "name": self.name,
             "model": self._model.state() if self._closing is None else self._closing.state(),

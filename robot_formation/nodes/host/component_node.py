@@ -109,7 +109,7 @@ def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
 
 
 def _complaint(name: str, text: str) -> str:
-    """Put the node's name before a message, unless it begins with it, or with the node's full name."""
+    """Return a message with the node's name before it, unless it begins with it, or with the node's full name."""
     who = text.partition(":")[0]
     return text if who.rpartition("/")[2] == name else f"{name}: {text}"
 
@@ -294,7 +294,7 @@ class Pacer:
         return max(0.0, self._due_s - self._clock())
 
     def worked(self, stamp_ns: int) -> None:
-        """Take note of the simulated time reached. Standing still doesn't build up credit to be made good later."""
+        """Register the simulated time reached. Standing still doesn't build up credit to be made good later."""
         step_ns = stamp_ns - self._simulated_ns
         self._simulated_ns = stamp_ns
         if self.factor <= 0.0:

@@ -77,7 +77,7 @@ class Outbox:
             self._waiting.popleft()
 
     def _matched(self, topic: Topic) -> bool:
-        """Tell whether all listeners, the recorder and whoever else has subscribed have matched."""
+        """Return whether all listeners, the recorder and whoever else has subscribed have matched."""
         publisher = self._publishers[topic]
         found = self._node.get_subscriptions_info_by_topic(publisher.topic_name)
         names = {info.node_name for info in found}
@@ -87,7 +87,7 @@ class Outbox:
         return names.issuperset(topic.listeners) and publisher.get_subscription_count() >= len(found)
 
     def _stood_in(self, topic: Topic) -> bool:
-        """Tell whether nodes of other names listen in place of those expected: a user's own predictor, say."""
+        """Return whether nodes of other names listen in place of those expected: a user's own predictor, say."""
         found = self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name)
         found = [info for info in found if _full_name(info) != self._recorder]
         names = {info.node_name for info in found if not info.node_name.startswith("_")} - {PROGRESS}

@@ -102,7 +102,7 @@ def _bare(value: Any) -> Any:
 
 
 def _like(current: Parameter, given: Parameter) -> Parameter:
-    """Give a value the type of the parameter where it is meant so: whole numbers, and lists without elements."""
+    """Convert a value to the type of the parameter where it is meant so: whole numbers, and lists without elements."""
     kind, value = current.type_, given.value
     if kind == Parameter.Type.DOUBLE and given.type_ == Parameter.Type.INTEGER:
         return Parameter(given.name, kind, float(value))
@@ -151,7 +151,7 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
 
 
 def ros_type(spec: Spec) -> str:
-    """Name a parameter's type as ROS does: double, string[] and so on."""
+    """Return the name of a parameter's type as ROS does: double, string[] and so on."""
     return str(_TYPES[spec.type].name).lower().replace("_array", "[]")
 
 
@@ -170,7 +170,7 @@ def refuse_unused_overrides(node: ParameterNode) -> None:
 
 
 def reasons(names: Iterable[str], fixed: Mapping[str, str]) -> dict[str, str]:
-    """Tell which of the parameters can't be set while a node runs, and why, by the first pattern that fits."""
+    """Return which of the parameters can't be set while a node runs, and why, by the first pattern that fits."""
     found = {name: next((why for pattern, why in fixed.items() if fnmatchcase(name, pattern)), "") for name in names}
     return {name: why for name, why in found.items() if why}
 

@@ -34,5 +34,5 @@ def ignore_signals() -> None:
 
 
 def stopped() -> bool:
-    """Tell whether a signal has asked this process to end."""
+    """Return whether a signal has asked this process to end."""
     return _signals.came()

@@ -52,7 +52,7 @@ class Keyboard:
         return self._descriptor >= 0
 
     def pressed(self) -> list[str]:
-        """Give the keys pressed since the last time: `space`, `right` or a character."""
+        """Return the keys pressed since the last time: `space`, `right` or a character."""
         if not self.attached or not select.select([self._descriptor], [], [], 0.0)[0]:
             return []
         text = os.read(self._descriptor, 1024).decode(errors="replace")

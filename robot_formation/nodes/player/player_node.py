@@ -196,7 +196,7 @@ class PlayerNode:
             self._executor.shutdown()
 
     def set_parameters(self, parameters: PlayerParameters) -> None:
-        """Take another rate, and whether to begin again at the end."""
+        """Set another rate, and whether to begin again at the end."""
         self._head.set_rate(parameters.rate, time.monotonic())
         self._parameters = parameters
 

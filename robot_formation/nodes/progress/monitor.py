@@ -48,7 +48,7 @@ def _set(values: Mapping[str, str | None]) -> None:
 
 
 def topic_of(name: str) -> names.Topic:
-    """Tell type and quality of service of a topic that `Progress` wants."""
+    """Return type and quality of service of a topic that `Progress` wants."""
     types = {topic.name: topic for topic in (names.MOVED, names.ALIGNMENT, names.DISPLACEMENT)}
     return types.get(name.rpartition("/")[2]) or names.ground_truth_pose("")
 
@@ -101,7 +101,7 @@ class Monitor:
             self._executor.spin_once(0.0)
 
     def drain(self, round_s: float, enough: Callable[[], bool] = lambda: False) -> None:
-        """Take what is still on its way: until it is enough, or some rounds in a row have brought nothing."""
+        """Process what is still on its way: until it is enough, or some rounds in a row have brought nothing."""
         quiet = 0
         for _ in range(_MOST_ROUNDS):
             if enough():

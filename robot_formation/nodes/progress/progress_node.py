@@ -76,7 +76,7 @@ class Executable:
         return exit_codes.DONE
 
     def _drain(self, executor: Executor) -> None:
-        """Take what is still on its way: the last timestep's messages, mostly."""
+        """Process what is still on its way: the last timestep's messages, mostly."""
         quiet = 0
         for _ in range(_MOST_ROUNDS):
             before = self._messages

@@ -39,11 +39,11 @@ class RecorderHealth:
         return str(self._publisher.topic_name)
 
     def publishes(self, name: str, namespace: str) -> bool:
-        """Tell whether a publisher of this node and namespace is the recorder itself."""
+        """Return whether a publisher of this node and namespace is the recorder itself."""
         return (name, namespace) == self._own
 
     def is_own(self, topic: str, cdr: bytes) -> bool:
-        """Tell whether a message that came is one that was sent from here; each is known once."""
+        """Return whether a message that came is one that was sent from here; each is known once."""
         if topic != self.topic or (message := _whole_words(cdr)) not in self._sent:
             return False
         self._sent.remove(message)
@@ -52,7 +52,7 @@ class RecorderHealth:
     def publish(
         self, stamp_ns: int, messages: int, topics: int, waiting_bytes: int, dropped: Counter[str], lost: Counter[str]
     ) -> None:
-        """Say how it goes: a warning as soon as anything is missing.
+        """Report the state: a warning as soon as anything is missing.
 
         Args:
             stamp_ns: the bag's time, nanoseconds.

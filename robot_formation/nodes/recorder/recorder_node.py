@@ -99,7 +99,7 @@ class RecorderParameters:
     metadata: tuple[str, ...] = parameter((), "Texts 'key=value' for the bag's metadata record")
 
     def selection(self, resolve: Callable[[str], str], namespace: str) -> Selection:
-        """Say which topics are meant; `resolve` makes names absolute, `namespace` is the recorder's.
+        """Return which topics are meant; `resolve` makes names absolute, `namespace` is the recorder's.
 
         Raises:
             BagError: a regular expression is none.
@@ -109,7 +109,7 @@ class RecorderParameters:
         return Selection(topics, self.regex, self.exclude, self.images, within)
 
     def write_options(self) -> WriteOptions:
-        """Say how the files are written."""
+        """Return how the files are written."""
         return WriteOptions(self.compression, self.chunk_bytes, self.split_bytes, round(self.split_s * 1e9))
 
     def texts(self) -> dict[str, str]:
@@ -285,7 +285,7 @@ class RecorderNode:
         return Counter({topic: intake.lost for topic, intake in self._subscribed.items() if intake.lost})
 
     def _is_of_others(self, topic: str, data: bytes) -> bool:
-        """Tell whether a message on the one topic that all formations share says nothing of this one's nodes."""
+        """Return whether a message on the one topic that all formations share says nothing of this one's nodes."""
         namespace = self._selection.namespace
         if not namespace or topic != names.DIAGNOSTICS.name or topic in self._selection.topics:
             return False
@@ -299,7 +299,7 @@ class RecorderNode:
         self._queue.call(partial(self._recorder.write_metadata, {key: text}))
 
     def _review(self) -> None:
-        """Tell how it goes, and which publishers the subscriptions made so far don't reach."""
+        """Report the state, and which publishers the subscriptions made so far don't reach."""
         if self._snapshot is not None:
             self._snapshot.look()
         for name, intake in self._subscribed.items():

@@ -22,7 +22,7 @@ def accepting(infos: Sequence[TopicEndpointInfo]) -> QoSProfile:
 
 
 def accepts(subscribed: QoSProfile, info: TopicEndpointInfo) -> bool:
-    """Tell whether a subscription gets what a publisher sends."""
+    """Return whether a subscription gets what a publisher sends."""
     offered = info.qos_profile
     if subscribed.reliability == ReliabilityPolicy.RELIABLE and offered.reliability != ReliabilityPolicy.RELIABLE:
         return False

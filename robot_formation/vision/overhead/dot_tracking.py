@@ -60,7 +60,7 @@ class DotTrack:
     missed: int = 0
 
     def seen(self, place: Array, gain: float) -> None:
-        """Take note of where the dot is now."""
+        """Register where the dot is now."""
         self.step = self.step + gain * ((place - self.place) / (self.missed + 1) - self.step)
         self.place, self.expected, self.missed = place, place + self.step, 0
 
@@ -99,7 +99,7 @@ class OverheadTracker:
     def configure(
         self, parameters: OverheadTrackingParameters, surface: Surface, starts: Mapping[str, tuple[float, float]]
     ) -> None:
-        """Take other parameters for the same robots, from the next picture on; tracks go on."""
+        """Set other parameters for the same robots, from the next picture on; tracks go on."""
         self._parameters = parameters
         self._locator = Locator(parameters.chosen(), surface, parameters.dot_height_m)
         self._starts = {name: self._locator.place_of(x, y) for name, (x, y) in starts.items()}
@@ -109,7 +109,7 @@ class OverheadTracker:
         self.tracks = {name: DotTrack(place, place, np.zeros(3)) for name, place in self._starts.items()}
 
     def update(self, picture: NDArray[np.uint8]) -> dict[str, Array]:
-        """Take the next picture, uint8 (rows, columns); return the places (3,) of the robots that were found in it."""
+        """Process the next picture, uint8 (rows, columns); return the places (3,) of the robots found in it."""
         if not self.tracks:
             return {}
         p = self._parameters
@@ -141,7 +141,7 @@ class OverheadTracker:
         return all_found(list(self._starts.values()))
 
     def _owners(self, places: Array) -> dict[str, int | None]:
-        """Give each robot its dot (a row of `places`), if it has one."""
+        """Assign each robot its dot (a row of `places`), if it has one."""
         names, gate = list(self.tracks), self._parameters.gate_m
         expected = np.array([self.tracks[name].expected for name in names])
         squares = _squares(expected, places)

@@ -71,7 +71,7 @@ class Tracker:
         self._last_us = 0
 
     def step(self, boxes: Sequence[Box], time_us: int) -> list[Block]:
-        """Take one frame's boxes.
+        """Process one frame's boxes.
 
         Args:
             boxes: the boxes, in the detector's order.

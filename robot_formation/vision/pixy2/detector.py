@@ -82,7 +82,7 @@ class BlockDetector:
         return self._boxes(self._scanner.scan(checked(picture)))
 
     def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
-        """Take the next frame and report the tracked blocks.
+        """Process the next frame and return the tracked blocks.
 
         Args:
             picture: RGB, shape (208, 316, 3), uint8.

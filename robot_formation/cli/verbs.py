@@ -1,0 +1,26 @@
+"""The verbs of the command line, in the order of its help: one module each, with `add_parser`."""
+
+from __future__ import annotations
+
+from robot_formation.cli import (
+    analyze,
+    calibrate,
+    detect,
+    doctor,
+    info,
+    list_,
+    play,
+    predict,
+    record,
+    recover,
+    replay,
+    run,
+    sweep,
+    teach,
+    test,
+)
+
+VERBS = (
+    *(run, sweep, list_, analyze, predict, record, play, info, recover, replay),
+    *(calibrate, teach, detect, doctor, test),
+)
