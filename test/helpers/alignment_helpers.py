@@ -1,12 +1,17 @@
 """Blocks of a neighbour at a known pose: what an ideal camera with the detector's known biases would report."""
 
+from collections.abc import Sequence
+
 import numpy as np
+import numpy.typing as npt
 
 from robot_formation.alignment.paper_rules import FRONT, REAR, TARGET
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.vision.pixy2.block import Block
+
+Array = npt.NDArray[np.float64]
 
 MODEL = MarkerModel(GeometryParameters())
 EDGES = EdgeParameters()
@@ -15,19 +20,24 @@ _LEAST_WIDTH_PX = {TARGET: 9.0, FRONT: 9.0, REAR: 15.0}
 _CORNERS = {TARGET: [0, 1, 2, 3], FRONT: [2, 3, 4, 5], REAR: [6, 7, 0, 1]}
 
 
-def state_of(x_m=0.0, y_m=FORMATION_DISTANCE_M, yaw_rad=0.0, curvature_per_m=BOWL_CURVATURE_PER_M):
+def state_of(
+    x_m: float = 0.0,
+    y_m: float = FORMATION_DISTANCE_M,
+    yaw_rad: float = 0.0,
+    curvature_per_m: float = BOWL_CURVATURE_PER_M,
+) -> Array:
     """The neighbour in the follower's frame."""
     return np.array([x_m, y_m, yaw_rad, curvature_per_m, 0.0, 0.0])
 
 
-def blocks_of(state):
+def blocks_of(state: Array) -> list[Block]:
     """Blocks of the faces that are wide enough to be reported, edges biased as the detector does."""
     pixels, widths = MODEL.pixels(state[None])[0], MODEL.widths(state)
     seen = [face for face, least in _LEAST_WIDTH_PX.items() if widths[face] > least]
     return [_block(face, pixels[_CORNERS[face]], seen, index) for index, face in enumerate(sorted(seen))]
 
 
-def _block(face, corners, seen, index):
+def _block(face: int, corners: Array, seen: Sequence[int], index: int) -> Block:
     e = EDGES
     biases = {
         TARGET: (e.target_left_px + (0.5 if FRONT in seen else 0.0), e.target_right_px),

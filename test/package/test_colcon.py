@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from graph_lab import open_lab
+from graph_lab import Lab, open_lab
 from repository import ROOT
 from robot_formation.bag.writer import BagWriter
 from robot_formation.components.catalogue import KINDS
@@ -126,7 +126,7 @@ def test_ros2_run_finds_every_node_which_takes_ros_arguments_and_ends_on_ctrl_c(
     }
     with BagWriter(tmp_path / "first") as writer:
         SyntheticRun(writer)
-    with open_lab(tmp_path) as lab:
+    with open_lab(tmp_path, Lab) as lab:
         environment = {**lab.environment, **sourced, "ROS_DOMAIN_ID": str(lab.domain)}
         started = {}
         for node in NODES:

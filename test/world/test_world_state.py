@@ -1,7 +1,9 @@
 """Save and restore go on to the last bit; single steps and another start time change nothing else."""
 
 import pickle
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ TOUCHING = (
 )
 
 
-def plain(events):
+def plain(events: Sequence[Any]) -> list[str | tuple[str, int, bytes]]:
     """Events as values that compare to the last bit."""
     return [
         (event.robot, event.stamp_ns, event.image.tobytes()) if isinstance(event, Frame) else repr(event)
@@ -24,7 +26,7 @@ def plain(events):
     ]
 
 
-def go_on(a_world):
+def go_on(a_world: World) -> list[str | tuple[str, int, bytes]]:
     """What happens from here: the rest of what is owed, then two more motions with pictures."""
     events = run(a_world)
     for robot, angles in (("follower_1", (1.0, -1.0, -1.0, 1.0)), ("leader", (4.0,) * 4)):
@@ -34,7 +36,7 @@ def go_on(a_world):
     return plain(events)
 
 
-def in_the_middle(a_world, steps):
+def in_the_middle(a_world: World, steps: int) -> World:
     a_world.request_frames("follower_1", 3)
     a_world.command("leader", (4.0,) * 4, SPEEDS)
     for _ in range(steps):
@@ -45,8 +47,10 @@ def in_the_middle(a_world, steps):
 @pytest.mark.parametrize("mode", ["pwm_stop", "pid"])
 @pytest.mark.parametrize("steps", [0, 37, 100])
 @pytest.mark.parametrize("robots", [PAIR, TOUCHING], ids=["apart", "touching"])
-def test_a_restored_world_goes_on_to_the_last_bit_also_in_a_fresh_one(mode, steps, robots):
-    values = {"seed": 5, "motor": {"drive_mode": mode}}
+def test_a_restored_world_goes_on_to_the_last_bit_also_in_a_fresh_one(
+    mode: str, steps: int, robots: tuple[RobotStart, RobotStart]
+) -> None:
+    values: dict[str, Any] = {"seed": 5, "motor": {"drive_mode": mode}}
     a_world = in_the_middle(world("bowl", robots, **values), steps)
     state = a_world.save()
     first = go_on(a_world)
@@ -58,14 +62,14 @@ def test_a_restored_world_goes_on_to_the_last_bit_also_in_a_fresh_one(mode, step
     assert go_on(fresh) == first
 
 
-def test_saving_changes_nothing():
+def test_saving_changes_nothing() -> None:
     first = go_on(in_the_middle(world("bowl", seed=5), 50))
     a_world = in_the_middle(world("bowl", seed=5), 50)
     a_world.save()
     assert go_on(a_world) == first
 
 
-def test_commands_that_wait_for_others_and_owed_frames_are_kept():
+def test_commands_that_wait_for_others_and_owed_frames_are_kept() -> None:
     a_world = world(lockstep=["leader", "follower_1"])
     a_world.command("leader", STRAIGHT, SPEEDS)
     state = a_world.save()
@@ -76,7 +80,7 @@ def test_commands_that_wait_for_others_and_owed_frames_are_kept():
     assert {event.robot for event in run(fresh)} == {"leader", "follower_1"}
 
 
-def test_a_state_of_another_setup_is_refused():
+def test_a_state_of_another_setup_is_refused() -> None:
     state = world("bowl", seed=5).save()
     for other in (world("plane", seed=5), world("bowl", seed=6), world("bowl", PAIR[:1], seed=5)):
         with pytest.raises(WorldError, match="another setup"):
@@ -84,7 +88,7 @@ def test_a_state_of_another_setup_is_refused():
         assert other.step_count == 0
 
 
-def test_single_steps_give_the_same_events_as_going_on():
+def test_single_steps_give_the_same_events_as_going_on() -> None:
     by_steps = in_the_middle(world("bowl", seed=5), 0)
     events = []
     while by_steps.owes:
@@ -95,8 +99,8 @@ def test_single_steps_give_the_same_events_as_going_on():
     assert plain(events) == plain(run(in_the_middle(world("bowl", seed=5), 0)))
 
 
-def test_another_start_time_shifts_the_stamps_and_nothing_else():
-    def events(start_ns):
+def test_another_start_time_shifts_the_stamps_and_nothing_else() -> None:
+    def events(start_ns: int) -> list[Any]:
         made = World(make_surface("bowl"), PAIR, parameters(), seed=5, start_ns=start_ns)
         made.command("leader", STRAIGHT, SPEEDS)
         made.request_frames("follower_1", 20)
