@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "test"))
+sys.path.insert(0, str(ROOT / "test" / "helpers"))
 
 NASTY = (
     *("", " ", "~", "null", "true", "no", "0", "-1", "1e3", "1e999", "-1e-999", ".nan", ".inf", "-.inf", "0x_", "0b2"),

@@ -58,14 +58,17 @@ def anywhere(rng: np.random.Generator) -> Place:
 
 
 def between(follower: Pose, leader: Pose) -> npt.NDArray[np.float64]:
-    """The leader's state as `relative_pose` has it, from both robots' poses in the world."""
+    """The leader's state (6,) as `marker_projection` has it, from both robots' poses in the world."""
     rotation = follower.matrix().T @ leader.matrix()
     place = follower.matrix().T @ (np.array(leader.position) - np.array(follower.position))
     yaw = math.atan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])
     tilt = rotation @ cv2.Rodrigues(np.array((0.0, 0.0, -yaw)))[0]
     roll, pitch = 0.5 * (tilt[2, 1] - tilt[1, 2]), 0.5 * (tilt[0, 2] - tilt[2, 0])
     x, y, _ = cv2.Rodrigues(np.array((-0.5 * roll, -0.5 * pitch, 0.0)))[0] @ place
-    return np.array((x, y, yaw, roll / y, pitch + roll / y * x))
+    # Of the curvatures that give this tilt (see `relative_tilt`) the least ones.
+    slopes = np.array([[y, y, x], [-x, x, -y]])
+    curvatures = np.linalg.lstsq(slopes, np.array((roll, pitch)), rcond=None)[0]
+    return np.array((x, y, yaw, *curvatures))
 
 
 def look(made: Equipment, start: Start, seed: int) -> Look | None:
