@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from predictor_helpers import forecasts
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ def algorithm_1(displacements, iterations):
 
 @settings(deadline=None, max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), dimension=st.integers(1, 4))
-def test_the_literal_innovation_is_zero_and_k_never_changes(seed, dimension):
+def test_the_literal_innovation_is_zero_and_k_never_changes(seed: int, dimension: int) -> None:
     rng = np.random.default_rng(seed)
     base = np.linalg.qr(rng.normal(size=(dimension + 1, dimension + 1)))[0][:dimension]
     steps = list(algorithm_1(base + rng.normal(0.0, 0.05, base.shape), 20))
@@ -50,20 +49,27 @@ def test_the_literal_innovation_is_zero_and_k_never_changes(seed, dimension):
         assert (step.k == steps[0].k).all()
 
 
-def test_the_literal_forecasts_are_powers_of_the_first_k():
+def test_the_literal_forecasts_are_powers_of_the_first_k() -> None:
     data = np.random.default_rng(1).normal(size=(2, 3))
     k = data[:, 1:] @ np.linalg.inv(data[:, :-1])
     for power, step in enumerate(algorithm_1(data, 6)):
         assert step.y == pytest.approx(np.linalg.matrix_power(k, power) @ data[:, 2])
 
 
-def test_only_p_changes():
+def test_only_p_changes() -> None:
     first, *_, last = algorithm_1(np.random.default_rng(2).normal(size=(2, 3)), 5)
     assert np.linalg.norm(last.p) < np.linalg.norm(first.p)
 
 
-def test_the_predictor_literal_forecasts_the_same():
-    data = np.array([(0.010, 0.050), (0.012, 0.049), (0.015, 0.051)])
-    found = forecasts("literal", [*data, *np.zeros((5, 2))], max_u_m=10.0, max_v_m=10.0)
-    for step, forecast in zip(list(algorithm_1(data.T, 6))[1:], found[2:], strict=True):
-        assert forecast == pytest.approx(step.y, rel=1e-9)
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (np.ones((2, 3)), "collinear"),
+        (np.zeros((2, 3)), "collinear"),
+        (np.ones((2, 1)), "at least two displacements"),
+        (np.full((2, 3), np.nan), "finite"),
+    ],
+)
+def test_displacements_that_it_cannot_start_from_are_refused(data: npt.NDArray[np.float64], message: str) -> None:
+    with pytest.raises(KoopmanError, match=message):
+        next(algorithm_1(data, 1))

@@ -8,11 +8,11 @@ import shlex
 from pathlib import Path
 
 import pytest
-from robot_formation.alignment.paper_mode import AlignmentParameters
 from test_docs import NODE_PAGES, PAGES
 from test_layers import LAYERS
 
 from repository import PACKAGE, ROOT
+from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.report import text_report
 from robot_formation.cli.main import main as command_line
