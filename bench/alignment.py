@@ -27,7 +27,6 @@ from alignment_grid import (
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
 from robot_formation.calibration.alignment_trial import Start
-from robot_formation.cli.sweep import with_progress
 from robot_formation.errors import FormationError
 
 LINES: tuple[tuple[str, Callable[[dict[str, Any]], str]], ...] = (

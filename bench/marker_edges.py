@@ -65,9 +65,8 @@ def between(follower: Pose, leader: Pose) -> npt.NDArray[np.float64]:
     tilt = rotation @ cv2.Rodrigues(np.array((0.0, 0.0, -yaw)))[0]
     roll, pitch = 0.5 * (tilt[2, 1] - tilt[1, 2]), 0.5 * (tilt[0, 2] - tilt[2, 0])
     x, y, _ = cv2.Rodrigues(np.array((-0.5 * roll, -0.5 * pitch, 0.0)))[0] @ place
-    # Of the curvatures that give this tilt (see `relative_tilt`) the least ones.
-    slopes = np.array([[y, y, x], [-x, x, -y]])
-    curvatures = np.linalg.lstsq(slopes, np.array((roll, pitch)), rcond=None)[0]
+    # Curvatures are more numbers than tilts; of those that give these tilts, the smallest. The picture is the same.
+    curvatures = np.linalg.lstsq(np.array(((y, y, x), (-x, x, -y))), np.array((roll, pitch)), rcond=None)[0]
     return np.array((x, y, yaw, *curvatures))
 
 

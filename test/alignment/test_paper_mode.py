@@ -6,19 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_formation.alignment.mode import Verdict
+from robot_formation.alignment.mode import Decision, Verdict
 from robot_formation.alignment.observation import bounding_boxes
 from robot_formation.alignment.paper_mode import AlignmentParameters, PaperAlignment
-from robot_formation.alignment.paper_mode import (
-    Face.FRONT,
-    Face.REAR,
-    Face.TARGET,
-    AlignmentParameters,
-    Decision,
-    PaperAlignment,
-    Verdict,
-    bounding_boxes,
-)
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.marker_face import Face
@@ -207,7 +197,7 @@ def test_empty_looks_count_only_in_a_row() -> None:
     assert alignment.assess([]).verdict is Verdict.LOST
 
 
-def test_two_blocks_of_one_signature_are_one_hull() -> None:
+def test_two_blocks_of_one_signature_are_one_box() -> None:
     left, right = Block(Face.TARGET, 145, 60, 20, 48), Block(Face.TARGET, 171, 62, 24, 44)
     (box,) = bounding_boxes([left, right]).values()
     assert (box.left, box.right, box.top, box.bottom) == (135, 183, 36, 84)
@@ -226,7 +216,7 @@ blocks = st.builds(
 
 
 @given(found=st.lists(blocks, max_size=6))
-def test_a_hull_holds_its_blocks_and_no_edge_lies_elsewhere(found: list[Block]) -> None:
+def test_a_bounding_box_holds_its_blocks_and_no_edge_lies_elsewhere(found: list[Block]) -> None:
     boxes = bounding_boxes(found)
     assert set(boxes) == {b.signature for b in found} - {4}
     for signature, box in boxes.items():

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_formation.drive.movement_system import (
-    JOINTS,
     CalibrationParameters,
     Drive,
     DriveAction,

@@ -48,10 +48,8 @@ def scenario(path: Path, *settings: str) -> Scenario:
 
 def tuned_component(path: Path) -> FineTunerComponent:
     kind = KINDS["fine_tuner"]
-    values = {**scenario(path).robot_parameters("fine_tuner", "follower_1"), "mode": "paper"}
-    found: FineTunerComponent = kind.component_class()(
-        from_mapping(kind.parameter_class(), values, where="test"), Place("follower_1")
-    )
+    parameters = scenario(path, "fine_tuner.mode=paper").of_robot(kind, "follower_1")
+    found: FineTunerComponent = kind.component_class()(parameters, Place("follower_1"))
     return found
 
 
@@ -152,7 +150,8 @@ def test_a_run_with_another_camera_refuses_the_file_and_one_with_other_light_doe
 
 
 def test_a_run_says_which_calibration_it_uses_and_keeps_the_values_in_its_bag(file: Path) -> None:
-    assert describe_camera(scenario(file)) == f"camera calibration: {file}, measured with seed 3, surface plane"
+    said = describe_camera(scenario(file).fine_tuner)
+    assert said == f"camera calibration: {file}, measured with seed 3, surface plane"
     assert json.loads(run_metadata(scenario(file))["camera_calibration"]) == VALUES
     assert describe_camera(load_track("two").fine_tuner) == ""
     assert camera_values(load_track("two").fine_tuner) == {}

@@ -1,12 +1,11 @@
 """Blocks of a neighbour at a known pose: what an ideal camera with the detector's known biases would report."""
 
-from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
-from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
+from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, Matrix, Vector
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
@@ -25,19 +24,19 @@ def state_of(
     y_m: float = FORMATION_DISTANCE_M,
     yaw_rad: float = 0.0,
     curvature_per_m: float = BOWL_CURVATURE_PER_M,
-) -> Array:
+) -> Vector:
     """The neighbour in the follower's frame."""
     return np.array([x_m, y_m, yaw_rad, curvature_per_m, 0.0, 0.0])
 
 
-def blocks_of(state: Array) -> list[Block]:
+def blocks_of(state: Vector) -> list[Block]:
     """Blocks of the faces that are wide enough to be reported, edges biased as the detector does."""
     pixels, widths = MODEL.pixels(state[None])[0], MODEL.widths(state)
     seen = [face for face, least in _LEAST_WIDTH_PX.items() if widths[face] > least]
     return [_block(face, pixels[_CORNERS[face]], seen, index) for index, face in enumerate(sorted(seen))]
 
 
-def _block(face: int, corners: Array, seen: Sequence[int], index: int) -> Block:
+def _block(face: Face, corners: Matrix, seen: list[Face], index: int) -> Block:
     e = EDGES
     biases = {
         Face.TARGET: (e.target_left_px + (0.5 if Face.FRONT in seen else 0.0), e.target_right_px),

@@ -41,9 +41,21 @@ def displacements(bag: Path) -> list[tuple[int, float, float, float]]:
     ]
 
 
-def launch(scenario: Scenario, bag: Path | None, **options: Any) -> RunResult:
-    """Run a scenario through the node graph; returns the result."""
-    return Launcher(scenario, bag, **options).run()
+def launch(scenario: Scenario, bag: Path | None, *, on_start=None, **options: Any) -> RunResult:
+    """Run a scenario through the node graph; returns the result.
+
+    Once all processes run, `on_start` is called with the ROS domain and the process ids by node name.
+    """
+    launcher = Launcher(scenario, bag, **options)
+    start = launcher._start
+
+    def observed(table, folder, environment):
+        start(table, folder, environment)
+        if on_start is not None:
+            on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in launcher._children})
+
+    launcher._start = observed
+    return launcher.run()
 
 
 def formation(*arguments: object, timeout: float = 300, **options: Any) -> subprocess.CompletedProcess[str]:

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from predictor_helpers import forecasts
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,15 +62,8 @@ def test_only_p_changes() -> None:
     assert np.linalg.norm(last.p) < np.linalg.norm(first.p)
 
 
-@pytest.mark.parametrize(
-    ("data", "message"),
-    [
-        (np.ones((2, 3)), "collinear"),
-        (np.zeros((2, 3)), "collinear"),
-        (np.ones((2, 1)), "at least two displacements"),
-        (np.full((2, 3), np.nan), "finite"),
-    ],
-)
-def test_displacements_that_it_cannot_start_from_are_refused(data: npt.NDArray[np.float64], message: str) -> None:
-    with pytest.raises(KoopmanError, match=message):
-        next(algorithm_1(data, 1))
+def test_the_predictor_literal_forecasts_the_same() -> None:
+    data = np.array([(0.010, 0.050), (0.012, 0.049), (0.015, 0.051)])
+    found = forecasts("literal", [*data, *np.zeros((5, 2))], max_u_m=10.0, max_v_m=10.0)
+    for step, forecast in zip(list(algorithm_1(data.T, 6))[1:], found[2:], strict=True):
+        assert forecast == pytest.approx(step.y, rel=1e-9)

@@ -22,7 +22,7 @@ def found(pattern: str, text: str) -> str:
 def test_the_example_runs_and_prints_what_it_says(capsys: pytest.CaptureFixture[str]) -> None:
     code = found(r"```python\n(.*?)```", PAGE)
     names: dict[str, Any] = {}
-    exec(compile(code, "docs/koopman.md", "exec"), names)
+    exec(compile(code, "docs/explanation/koopman.md", "exec"), names)
     printed = capsys.readouterr().out
     stated = found(r"# (\[[^]]*\]): mu, 2 mu, lam", code)
     assert printed.startswith(stated)

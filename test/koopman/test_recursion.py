@@ -267,21 +267,29 @@ def test_a_restored_state_goes_on_to_the_last_bit(kind: str, before: int, spread
     assert twin.state() == dmd.state()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"k": [[1.0]]}, "'k' of the stored state"),
-        ({"k": [[1.0, "x"], [0.0, 1.0]]}, "real numbers"),
-        ({"p": [[1.0, 0.0], [0.0, -1.0]]}, "positive definite"),
-        ({"p": [[1.0, 0.5], [0.0, 1.0]]}, "symmetric"),
-        ({"p": [[1.0, np.nan], [np.nan, 1.0]]}, "finite"),
-        ({"settings": {"dimension": 2, "speed": 3}}, "stored state"),
-        ({"settings": None}, "stored state"),
-        ({"trace": "far"}, "stored state"),
-        ({"trace": None}, "stored state"),
-    ],
-)
+DAMAGE = [
+    *(
+        (kind, {"settings": settings}, "stored state")
+        for kind in KINDS
+        for settings in ({"dimension": 2, "s": 3}, None)
+    ),
+    ("online", {"k": [[1.0]]}, "'k' of the stored state"),
+    ("online", {"k": [[1.0, "x"], [0.0, 1.0]]}, "real numbers"),
+    ("online", {"p": [[1.0, 0.0], [0.0, -1.0]]}, "positive definite"),
+    ("online", {"p": [[1.0, 0.5], [0.0, 1.0]]}, "symmetric"),
+    ("online", {"p": [[1.0, np.nan], [np.nan, 1.0]]}, "finite"),
+    ("online", {"trace": "far"}, "stored state"),
+    ("online", {"trace": None}, "stored state"),
+    ("windowed", {"x": [[1.0]]}, "'x' of the stored state"),
+    ("windowed", {"y": [[1.0, "x"]]}, "real numbers"),
+    ("windowed", {"y": [[1.0, np.nan]]}, "finite"),
+    ("windowed", {"x": [[1e200, 1.0]], "y": [[1.0, 1.0]]}, "at most 1e"),
+    ("windowed", {"prior_share": "far"}, "stored state"),
+    ("windowed", {"prior_share": None}, "stored state"),
+]
+
+
+@pytest.mark.parametrize(("kind", "change", "message"), DAMAGE)
 def test_a_stored_state_that_was_damaged_is_refused(kind: str, change: dict[str, Any], message: str) -> None:
     dmd = KINDS[kind](2)
     for x in np.random.default_rng(3).normal(size=(12, 2)):

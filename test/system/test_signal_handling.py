@@ -55,9 +55,7 @@ def test_an_ignored_hangup_stays_ignored(handlers: dict[Signals, Any]) -> None:
 
 
 @pytest.mark.parametrize("ignored", [True, False])
-def test_a_launcher_and_a_verb_with_a_node_count_a_hangup_unless_it_is_ignored(
-    handlers: dict[Signals, Any], ignored: bool
-) -> None:
+def test_a_hangup_is_counted_unless_it_is_ignored(handlers: dict[Signals, Any], ignored: bool) -> None:
     if ignored:
         ignore_hangup()
     with SignalCounter() as signals:

@@ -55,7 +55,7 @@ def frames(tree: Element) -> dict[str, npt.NDArray[np.float64]]:
 def test_it_is_one_tree_with_the_documented_links() -> None:
     tree = tree_of()
     links = [link.get("name", "") for link in tree.iter("link")]
-    assert sorted(links) == sorted(["base_link", *JOINT_NAMES, "marker", "camera_link", "camera_optical_frame"])
+    assert sorted(links) == sorted(["base_link", *JOINTS, "marker", "camera_link", "camera_optical_frame"])
     assert tree.tag == "robot"
     assert tree.get("name") == "follower_1"
     children = [value(joint, "child", "link") for joint in tree.iter("joint")]

@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.experiment.scenario import load_track
+from robot_formation.parameters import to_mapping
 from robot_formation.surface import Surface, make_surface
 from robot_formation.vision.overhead.dots import find_dots
 from robot_formation.world.overhead import OverheadCamera
@@ -108,8 +109,10 @@ def test_noise_has_its_size_and_depends_on_seed_and_number_only() -> None:
 
 
 def test_the_good_calibration_of_config_is_the_camera_of_config() -> None:
-    world, tracker = node_defaults("world"), node_defaults("overhead_tracker")
-    shared = [name.removeprefix("good.") for name in tracker if f"overhead.{name.removeprefix('good.')}" in world]
+    scenario = load_track("two")
+    world, tracker = scenario.world, scenario.overhead_tracker
+    camera_values, good = to_mapping(world.overhead), to_mapping(tracker.good)
+    shared = sorted(set(camera_values) & set(good))
     assert len(shared) == 11
     assert [good[name] for name in shared] == [camera_values[name] for name in shared]
     assert (tracker.dot_height_m, tracker.dot_radius_m) == (world.marker.top_m, world.marker.dot_radius_m)

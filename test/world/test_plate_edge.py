@@ -51,14 +51,6 @@ def test_it_takes_no_more_commands_and_the_others_go_on() -> None:
     assert a_world.ground_truth("leader") == before
 
 
-def test_a_held_robot_stays_held_after_a_restore() -> None:
-    a_world, _ = leave()
-    fresh = world("bowl", NEAR_EDGE)
-    fresh.restore(a_world.save())
-    with pytest.raises(WorldError, match="has left the plate"):
-        fresh.command("leader", (-8.0,) * 4, SPEEDS)
-
-
 def test_wheels_may_stand_beside_the_plate() -> None:
     starts = (RobotStart("leader", 0.05, 0.6, 0.5 * math.pi), RobotStart("follower_1", 1.7, 0.6, 0.5 * math.pi))
     a_world = world("bowl", starts)

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from robot_formation.alignment.mode import Verdict
-from robot_formation.alignment.paper_mode import Decision, Verdict
+from robot_formation.alignment.mode import Decision, Verdict
 from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, SearchParameters
 from robot_formation.geometry.se2 import Motion
 

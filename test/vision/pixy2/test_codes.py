@@ -39,7 +39,7 @@ def test_a_code_is_read_in_the_direction_of_the_smaller_number(
     assert (box.signature, box.angle) == (code, angle)
 
 
-def test_the_box_of_a_code_is_the_hull_of_its_parts() -> None:
+def test_the_box_of_a_code_is_the_bounding_box_of_its_parts() -> None:
     (box,) = detector(mode=1).detect(TOP_DOWN)
     assert (box.left, box.top, box.bottom) == (100, 20, 139)
 

@@ -10,7 +10,7 @@ from cases import case
 from robot_formation.vision.pixy2.color_table import run_time_bounds
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.signatures import teach_point, teach_region
-from vision_helpers import EXAMPLES, GROUPS, PARAMETERS, picture
+from vision_helpers import EXAMPLES, GROUPS, PARAMETERS, picture, row_segments
 
 
 def by_area(blocks: Sequence[dict[str, int]]) -> list[dict[str, int]]:
@@ -58,7 +58,7 @@ def check_blocks(example: dict[str, Any], name: str) -> None:
 def test_row_segments_are_those_of_the_example() -> None:
     for example in EXAMPLES["images"]:
         detector = BlockDetector(GROUPS[example["group"]], PARAMETERS["paper"])
-        segments = detector.row_segments(picture(example["image"]))
+        segments = row_segments(detector, picture(example["image"]))
         assert [list(segment) for segment in segments] == example["row_segments_paper"], label(example)
 
 
