@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from alignment_grid import equipment
 from robot_formation import names
+from robot_formation.alignment.observation import FaceBox
 from robot_formation.alignment.precise.marker_edges import (
     Edge,
     EdgeParameters,
@@ -43,7 +44,7 @@ NAMES = {Face.TARGET: "Target", Face.FRONT: "Front", Face.REAR: "Rear"}
 
 
 Place = tuple[float, float, float]
-Look = tuple[npt.NDArray[np.float64], Mapping[int, Box]]
+Look = tuple[npt.NDArray[np.float64], Mapping[Face, FaceBox]]
 
 
 def near(rng: np.random.Generator) -> Place:
@@ -103,10 +104,10 @@ def looks(place: Callable[[np.random.Generator], Place], count: int, seed: int) 
     return [entry for entry in found if entry is not None]
 
 
-def errors(found: Sequence[Look]) -> tuple[dict[str, list[float]], dict[int, list[tuple[float, bool]]]]:
+def errors(found: Sequence[Look]) -> tuple[dict[str, list[float]], dict[Face, list[tuple[float, bool]]]]:
     """Reported minus true edges [px], by a description of the edge; and widths of faces with whether they are seen."""
     edges: defaultdict[str, list[float]] = defaultdict(list)
-    shown: defaultdict[int, list[tuple[float, bool]]] = defaultdict(list)
+    shown: defaultdict[Face, list[tuple[float, bool]]] = defaultdict(list)
     for state, boxes in found:
         columns, widths = MODEL.pixels(state[None])[0, :, 0], MODEL.widths(state)
         if Face.TARGET not in boxes or columns.min() < 3.0 or columns.max() > WIDTH - 4.0:
@@ -130,7 +131,7 @@ def errors(found: Sequence[Look]) -> tuple[dict[str, list[float]], dict[int, lis
     return edges, shown
 
 
-def _error(state: npt.NDArray[np.float64], boxes: Mapping[int, Box], face: int, side: str) -> float:
+def _error(state: npt.NDArray[np.float64], boxes: Mapping[Face, FaceBox], face: Face, side: str) -> float:
     reported: float = getattr(boxes[face], side)
     return reported - float(MODEL.edges(state[None], [Edge(face, side, 0.0, 1.0)])[0, 0])
 

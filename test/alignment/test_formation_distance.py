@@ -6,10 +6,9 @@ import pytest
 
 from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.calibration.alignment_trial import AlignmentTrial, Equipment, Start
-from robot_formation.components.block_detector import BlockDetectorNodeParameters
-from robot_formation.components.world import WorldNodeParameters
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters, WorldNodeParameters
 from robot_formation.drive.movement_system import DriveParameters
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.follower.fine_tuning import FineTunerParameters
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.parameters import ParameterError, from_mapping

@@ -22,6 +22,7 @@ from robot_formation.follower.camera_calibration_file import (
 )
 from robot_formation.follower.fine_tuning import FineTunerParameters
 from robot_formation.launching.processes import run_metadata
+from robot_formation.parameters import from_mapping
 from robot_formation.vision.marker_face import Face
 from robot_formation.vision.pixy2.block import Block
 
@@ -49,7 +50,8 @@ def scenario(path: Path, *settings: str) -> Scenario:
 def tuned_component(path: Path) -> FineTunerComponent:
     kind = KINDS["fine_tuner"]
     parameters = scenario(path, "fine_tuner.mode=paper").of_robot(kind, "follower_1")
-    found: FineTunerComponent = kind.component_class()(parameters, Place("follower_1"))
+    found = kind.component_class()(parameters, Place("follower_1"))
+    assert isinstance(found, FineTunerComponent)
     return found
 
 

@@ -1,6 +1,5 @@
 """Blocks of a neighbour at a known pose: what an ideal camera with the detector's known biases would report."""
 
-
 import numpy as np
 import numpy.typing as npt
 

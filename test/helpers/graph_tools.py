@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.run_result import RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.launching.launcher import Launcher
+from robot_formation.launching.processes import Process
 
 SHORT = ("leader.timesteps=4", "world.camera.mode=on_demand")
 
@@ -41,7 +42,13 @@ def displacements(bag: Path) -> list[tuple[int, float, float, float]]:
     ]
 
 
-def launch(scenario: Scenario, bag: Path | None, *, on_start=None, **options: Any) -> RunResult:
+def launch(
+    scenario: Scenario,
+    bag: Path | None,
+    *,
+    on_start: Callable[[int, dict[str, int]], None] | None = None,
+    **options: Any,
+) -> RunResult:
     """Run a scenario through the node graph; returns the result.
 
     Once all processes run, `on_start` is called with the ROS domain and the process ids by node name.
@@ -49,12 +56,12 @@ def launch(scenario: Scenario, bag: Path | None, *, on_start=None, **options: An
     launcher = Launcher(scenario, bag, **options)
     start = launcher._start
 
-    def observed(table, folder, environment):
+    def observed(table: list[Process], folder: Path, environment: dict[str, str]) -> None:
         start(table, folder, environment)
         if on_start is not None:
             on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in launcher._children})
 
-    launcher._start = observed
+    launcher._start = observed  # type: ignore[method-assign]
     return launcher.run()
 
 

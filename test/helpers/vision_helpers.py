@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from repository import ROOT
 from robot_formation.parameters import from_mapping
+from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import checked
 from robot_formation.vision.pixy2.signatures import Signature
@@ -71,7 +72,7 @@ def random_picture(rng: np.random.Generator) -> npt.NDArray[np.uint8]:
     return np.clip(image, 0, 255).astype(np.uint8)
 
 
-def row_segments(detector, picture):
+def row_segments(detector: BlockDetector, picture: npt.NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
     """A detector's row segments (signature, row, start cell, length) in the order of the scan; a cell is 2 x 1 px."""
     found = detector._scanner.scan(checked(picture))
     columns = (found.signature, found.row, found.start, found.end - found.start)

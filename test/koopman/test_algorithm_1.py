@@ -1,27 +1,31 @@
 """Algorithm 1 of the paper as it is printed never learns: its innovation is zero, see docs/koopman.md."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from predictor_helpers import forecasts
 
+Array = npt.NDArray[np.float64]
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
     """The loop's variables after an iteration: K and P (n, n), its x, y and innovation y - K x (n,) with the old K."""
 
-    k: np.ndarray
-    p: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    innovation: np.ndarray
+    k: Array
+    p: Array
+    x: Array
+    y: Array
+    innovation: Array
 
 
-def algorithm_1(displacements, iterations):
+def algorithm_1(displacements: Array, iterations: int) -> Iterator[Step]:
     """Run the paper's "Prediction algorithm" line by line; yields what its start and then each iteration leaves."""
     data = np.asarray(displacements)
     xs, ys = data[:, :-1], data[:, 1:]

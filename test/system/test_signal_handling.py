@@ -64,7 +64,7 @@ def test_a_hangup_is_counted_unless_it_is_ignored(handlers: dict[Signals, Any], 
         assert signals.came() is not ignored
 
 
-def test_signals_beyond_the_patience_interrupt(handlers):
+def test_signals_beyond_the_patience_interrupt(handlers: dict[Signals, Any]) -> None:
     with SignalCounter() as signals:
         for _ in range(3):
             signal.raise_signal(signal.SIGINT)

@@ -63,7 +63,7 @@ def test_in_formation_the_target_face_has_the_paper_s_size_and_the_other_faces_a
 @pytest.mark.parametrize(
     ("turn_deg", "shown", "hidden"), [(40.0, Face.REAR, Face.FRONT), (-40.0, Face.FRONT, Face.REAR)]
 )
-def test_a_neighbour_that_turns_shows_one_more_face(turn_deg: float, shown: int, hidden: int) -> None:
+def test_a_neighbour_that_turns_shows_one_more_face(turn_deg: float, shown: Face, hidden: Face) -> None:
     widths = MarkerModel(P).widths(np.array([0.0, 0.4, math.radians(turn_deg), 0.0, 0.0, 0.0]))
     assert widths[shown] > 5.0
     assert widths[hidden] < 0.0
