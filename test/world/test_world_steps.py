@@ -48,6 +48,7 @@ def test_another_start_time_shifts_the_stamps_and_nothing_else() -> None:
     for a, b in zip(first, later, strict=True):
         assert b.stamp_ns - a.stamp_ns == 7 * 10**9
         if isinstance(a, Frame):
+            assert isinstance(b, Frame)
             assert np.array_equal(a.image, b.image)
         else:
             assert replace(b, stamp_ns=a.stamp_ns) == a

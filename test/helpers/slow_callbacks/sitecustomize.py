@@ -32,7 +32,7 @@ def stop_on_signals() -> None:
         Path(os.environ["SLOW_CALLBACKS"], str(os.getpid())).touch()
         return heard(node, slow)
 
-    Host._heard = slowly_heard  # type: ignore[method-assign]
+    Host._heard = slowly_heard  # type: ignore[assignment, method-assign]
 
 
 signals.stop_on_signals = stop_on_signals
