@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
@@ -16,7 +15,7 @@ from robot_formation.network import shared_memory_space
 from robot_formation.network.shared_memory_space import SharedMemoryError, require_space
 
 
-def file_system(free: int, flags: int = 0, size: int = 64 << 20) -> Callable[..., Any]:
+def file_system(free: int, flags: int = 0, size: int = 64 << 20) -> Callable[[object], SimpleNamespace]:
     return lambda folder: SimpleNamespace(f_bavail=free // 4096, f_frsize=4096, f_blocks=size // 4096, f_flag=flags)
 
 
@@ -30,7 +29,7 @@ def test_a_full_one_is_refused_with_what_to_do(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("state", [file_system(64 << 10, size=64 << 10), file_system(0, os.ST_RDONLY)])
-def test_a_small_one_and_a_read_only_one_will_do(tmp_path: Path, state: Callable[..., Any]) -> None:
+def test_a_small_one_and_a_read_only_one_will_do(tmp_path: Path, state: Callable[[object], SimpleNamespace]) -> None:
     require_space(tmp_path, state)
 
 
@@ -38,7 +37,7 @@ def test_none_at_all_will_do(tmp_path: Path) -> None:
     require_space(tmp_path / "missing")
 
 
-def full(folder: None = None, statvfs: None = None) -> None:
+def full(folder: object = None, statvfs: object = None) -> None:
     raise SharedMemoryError("/dev/shm is full")
 
 
