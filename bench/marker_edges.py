@@ -29,7 +29,7 @@ from robot_formation.alignment.precise.marker_edges import (
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
 from robot_formation.batch.pool import run_parallel
 from robot_formation.calibration.alignment_trial import FOLLOWER, Equipment, Start, poses
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.picture import WIDTH

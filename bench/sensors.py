@@ -40,7 +40,7 @@ from robot_formation.experiment.sweep import CONDITIONS
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
 from robot_formation.vision.aruco_detector import TagDetector
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.boxes import Box
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world.camera import Camera

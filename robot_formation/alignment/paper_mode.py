@@ -15,7 +15,7 @@ from robot_formation.alignment.mode import Decision, Frames, Verdict
 from robot_formation.alignment.observation import FaceBox, bounding_boxes
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.parameters import ParameterError, parameter
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robot_formation.alignment.observation import MARGIN_PX, FaceBox, bounding_boxes
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.calibration.camera_samples import CameraSample
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH
 
 Corners = NDArray[np.float64]

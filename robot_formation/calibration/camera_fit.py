@@ -25,7 +25,7 @@ from robot_formation.alignment.observation import MARGIN_PX, FaceBox, bounding_b
 from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.picture import WIDTH
 
 Floats = NDArray[np.float64]

@@ -20,7 +20,7 @@ from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters, WorldNodeParameters
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.follower.fine_tuning import LookParameters
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.picture import scaled

@@ -13,8 +13,8 @@ import cv2
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters
-from robot_formation.marker import MarkerKind
 from robot_formation.vision.aruco_detector import BlockSensor, TagDetector
+from robot_formation.vision.marker import MarkerKind
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.detector import BlockDetector

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from robot_formation import names
 from robot_formation.follower.fine_tuning import FineTunerParameters
-from robot_formation.marker import MarkerKind
 from robot_formation.parameters import ParameterError, parameter
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES, Surface, surface_from_texts
 from robot_formation.vision.aruco_detector import TagParameters
+from robot_formation.vision.marker import MarkerKind
 from robot_formation.vision.overhead.dot_tracking import OverheadTrackingParameters
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.signatures import Signature, load_signatures

@@ -6,10 +6,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from robot_formation.errors import FormationError
-from robot_formation.marker import MarkerKind
 from robot_formation.parameters import flatten
 from robot_formation.paths import config_dir
 from robot_formation.system.yaml_files import read_yaml
+from robot_formation.vision.marker import MarkerKind
 
 
 class ScenarioError(FormationError):

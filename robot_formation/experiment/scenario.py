@@ -23,7 +23,6 @@ from robot_formation.errors import shown
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
-from robot_formation.marker import MarkerKind
 from robot_formation.parameters import (
     ParameterError,
     check_as,
@@ -37,6 +36,7 @@ from robot_formation.parameters import (
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
 from robot_formation.system.yaml_files import YamlError, parse_yaml
+from robot_formation.vision.marker import MarkerKind
 
 P = TypeVar("P")
 Settings = Mapping[str, Mapping[str, object]]

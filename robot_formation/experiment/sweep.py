@@ -21,7 +21,7 @@ from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
-from robot_formation.experiment.oracle import IDEAL, IdealRun
+from robot_formation.experiment.noise_floor import IDEAL, IdealRun
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.parameters import suggestion
 from robot_formation.surface import SURFACES

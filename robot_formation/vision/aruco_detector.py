@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robot_formation.parameters import parameter
 from robot_formation.vision.aruco_patterns import MODULES, QUIET_MODULES, dictionary
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import Tracker, limited
 from robot_formation.vision.pixy2.boxes import Box

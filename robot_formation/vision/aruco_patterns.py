@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.errors import FormationError
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 
 MODULES = 7
 """Modules along a tag's dark square: five of data between two of border."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from robot_formation.marker import MarkerKind
 from robot_formation.parameters import Choice, ParameterError, parameter
+from robot_formation.vision.marker import MarkerKind
 
 
 class DriveMode(Choice):

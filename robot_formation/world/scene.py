@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.marker import MarkerKind
 from robot_formation.surface import Surface
+from robot_formation.vision.marker import MarkerKind
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
 from robot_formation.world.tag_faces import FACES, tag_rectangles

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.vision.aruco_patterns import MODULES, QUIET_MODULES, pattern
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 
 Array = NDArray[np.float64]
 FACES: dict[Face, tuple[float, float, float]] = {

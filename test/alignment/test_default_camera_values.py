@@ -12,7 +12,7 @@ from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.parameters import from_mapping, specs
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.boxes import Box
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters

@@ -11,7 +11,7 @@ from robot_formation.alignment.observation import bounding_boxes
 from robot_formation.alignment.paper_mode import AlignmentParameters, PaperAlignment
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 P = AlignmentParameters()

@@ -23,7 +23,7 @@ from robot_formation.calibration.camera_fit import (
 )
 from robot_formation.calibration.camera_samples import CameraSample, overlay
 from robot_formation.drive.curves import CalibrationError
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 EDGE_M, FOCAL_PX, CENTRE_PX, BIAS_PX = 0.06, 273.7, 157.5, 2.0

@@ -28,7 +28,7 @@ from robot_formation.cli.main import main
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.follower.camera_calibration_file import load_vision
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 pytestmark = pytest.mark.slow

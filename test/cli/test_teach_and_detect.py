@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from robot_formation.cli import detect, teach
 from robot_formation.errors import FormationError
-from robot_formation.marker import MarkerKind
 from robot_formation.parameters import specs, to_mapping
+from robot_formation.vision.marker import MarkerKind
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture_files import CAMERA_PARAMETERS, read_parameters
 from robot_formation.vision.pixy2.signatures import load_signatures, save_signatures

@@ -16,12 +16,11 @@ from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.node_defaults import node_defaults, parameter_file
 from robot_formation.experiment.scenario import load, load_track, override
-from robot_formation.marker import MarkerKind
 from robot_formation.parameters import ParameterError, flatten, from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
 from robot_formation.vision.aruco_detector import BlockSensor
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face, MarkerKind
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.picture import PictureError

@@ -10,7 +10,7 @@ from component_helpers import Wire, wired
 from robot_formation import conversions, exit_codes
 from robot_formation.alignment.paper_mode import AlignmentParameters, PaperAlignment
 from robot_formation.geometry.se2 import Motion
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 BASE, CAMERA = "follower_1/base_link", "follower_1/camera_optical_frame"

@@ -23,7 +23,7 @@ from robot_formation.follower.camera_calibration_file import (
 from robot_formation.follower.fine_tuning import FineTunerParameters
 from robot_formation.launching.processes import run_metadata
 from robot_formation.parameters import from_mapping
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 VALUES = {

@@ -23,7 +23,7 @@ from robot_formation.follower.fine_tuning import (
 )
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 IN_PLACE = [Block(Face.TARGET, 158, 60, 49, 49, index=7)]

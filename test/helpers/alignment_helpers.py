@@ -6,7 +6,7 @@ import numpy.typing as npt
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, Matrix, Vector
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 Array = npt.NDArray[np.float64]

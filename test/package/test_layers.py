@@ -12,7 +12,7 @@ from repository import PACKAGE
 
 # From the bottom to the top, in a strict order: a part imports those before it only.
 LAYERS = [
-    ("errors", "exit_codes", "marker", "names", "parameters", "paths", ""),
+    ("errors", "exit_codes", "names", "parameters", "paths", ""),
     *((room,) for room in ("system", "network", "batch", "geometry", "koopman", "surface", "bag", "vision", "world")),
     *((room,) for room in ("drive", "leader", "alignment", "follower", "analysis", "conversions", "components")),
     *((room,) for room in ("calibration", "experiment", "nodes", "launching", "cli")),

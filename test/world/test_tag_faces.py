@@ -10,7 +10,7 @@ from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.surface import make_surface
 from robot_formation.vision import aruco_patterns
 from robot_formation.vision.aruco_patterns import MODULES, pattern
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.world.camera import Camera
 from robot_formation.world.description import robot_description
 from robot_formation.world.marker_picture import marker_picture

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 from robot_formation.alignment.observation import MARGIN_PX, FaceBox, bounding_boxes
 from robot_formation.parameters import ParameterError, parameter
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH
 
-# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
+# All chosen.
 _CUT = 6.0
 """Factor on the scatter of the rows of a face that the picture cuts off: the hidden part may reach higher."""
 _SPLIT_PX = 12.0
@@ -118,6 +118,11 @@ class EdgeParameters:
                     f"fine_tuner: '{face}_widths_px' must ascend, and '{face}_{side}_px' and '{face}_{side}_sigma_px' "
                     "have one value more than it"
                 )
+
+    @property
+    def height_bias_px(self) -> float:
+        """What the detector reports more than a block's true height, px."""
+        return self.target_bottom_px - self.target_top_px
 
     def clear(self, target: FaceBox | None) -> bool:
         """Whether the marker is near and frontal enough for the finer values of its outer edges."""

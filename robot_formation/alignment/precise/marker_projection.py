@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from robot_formation.alignment.precise.marker_edges import Edge
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]

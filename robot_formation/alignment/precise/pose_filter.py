@@ -33,10 +33,10 @@ from robot_formation.alignment.precise.marker_projection import (
 from robot_formation.alignment.precise.pose_hypothesis import Hypothesis, LookUpdate
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
-# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
+# All chosen; docs/alignment.md ("Constants") says how far runs depend on some of them.
 _KEPT_COST = 16.0
 """Hypotheses are kept up to so much more twice the negative log likelihood than the best has: four standard
 deviations."""
@@ -306,7 +306,7 @@ class PoseFilter:
         box = boxes[face]
         guesses = []
         for degrees in range(-_WIDEST_GUESS_DEG, _WIDEST_GUESS_DEG + 1, _GUESS_STEP_DEG):
-            guess = self._model.place(face, box.x, box.height + 2.7, math.radians(degrees))
+            guess = self._model.place(face, box.x, box.height - self._edges.height_bias_px, math.radians(degrees))
             ground = [self._p.curvature_sigma_per_m**2, self._p.saddle_sigma_per_m**2, self._p.skew_sigma_per_m**2]
             covariance = np.diag([_GUESS_SIGMA_M**2, _GUESS_SIGMA_M**2, _GUESS_SIGMA_RAD**2, *ground])
             guesses.append(Hypothesis(guess, covariance))

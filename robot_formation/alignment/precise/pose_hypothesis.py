@@ -10,10 +10,10 @@ import numpy as np
 
 from robot_formation.alignment.precise.marker_edges import Edge, EdgeParameters, View, hidden, sliver
 from robot_formation.alignment.precise.marker_projection import SIZE, YAW, MarkerModel, Matrix, Vector, X, Y
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.picture import WIDTH
 
-# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
+# All chosen.
 _ITERATIONS, _CONVERGED = 6, 1e-5
 """Most iterations of an update, and the change of the state [m, rad, 1/m] below which it ends."""
 _LARGEST_CHANGE_RAD = 0.3

@@ -24,9 +24,9 @@ from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, 
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 
-# All chosen, with bench/alignment.py; docs/alignment.md ("Constants") says how far runs depend on them.
+# All chosen.
 _IMPLAUSIBLE_NIS = 6.0
 """NIS of a look from which on it is taken not to show the whole marker."""
 _VIEWPOINTS_M = (0.135, -0.135, 0.135, -0.12, 0.12)

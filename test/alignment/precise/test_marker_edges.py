@@ -14,7 +14,7 @@ from robot_formation.alignment.precise.marker_edges import (
     view,
 )
 from robot_formation.parameters import ParameterError
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH
 

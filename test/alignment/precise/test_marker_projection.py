@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, relative_tilt
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 
 Array = npt.NDArray[np.float64]
 

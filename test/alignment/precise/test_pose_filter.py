@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alignment_helpers import BOWL_CURVATURE_PER_M, EDGES, MODEL, blocks_of, state_of
-from robot_formation.alignment.observation import bounding_boxes
+from robot_formation.alignment.observation import FaceBox, bounding_boxes
+from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.alignment.precise.marker_projection import (
     SADDLE,
     SKEW,
@@ -23,7 +24,7 @@ from robot_formation.alignment.precise.marker_projection import (
 )
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 FORMATION = Motion(y_m=-FORMATION_DISTANCE_M)
@@ -106,6 +107,16 @@ def test_a_whole_marker_is_told_from_a_half_covered_face(
         edge = box.left + share * box.width
         rest = replace(box, left=edge) if left else replace(box, right=edge)
         assert not new_filter().whole({Face.TARGET: rest})
+
+
+@pytest.mark.parametrize("edges", [EDGES, EdgeParameters(target_top_px=0.0, target_bottom_px=0.0)])
+def test_first_guesses_are_at_the_distance_of_the_height_without_the_detectors_bias(edges: EdgeParameters) -> None:
+    depth_px_m = MODEL.parameters.focal_length_px * MODEL.parameters.marker_edge_m
+    height_px = depth_px_m / 0.328 + edges.target_bottom_px - edges.target_top_px
+    found = PoseFilter(MODEL, edges, FilterParameters())
+    guesses = found._guesses({Face.TARGET: FaceBox(133.0, 183.0, 60.0, 60.0 + height_px)})
+    (straight,) = (guess for guess in guesses if guess.state[YAW] == 0.0)
+    assert straight.state[Y] == pytest.approx(0.328 - 0.038 + 0.03)
 
 
 def test_a_block_far_from_where_its_face_should_be_is_left_out() -> None:

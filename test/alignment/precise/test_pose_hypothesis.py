@@ -10,7 +10,7 @@ from robot_formation.alignment.observation import bounding_boxes
 from robot_formation.alignment.precise.marker_edges import Edge, View, view
 from robot_formation.alignment.precise.marker_projection import Vector, X, Y
 from robot_formation.alignment.precise.pose_hypothesis import Hypothesis, LookUpdate
-from robot_formation.vision.marker_face import Face
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.picture import WIDTH
 
 UPDATE = LookUpdate(MODEL, EDGES)

@@ -11,7 +11,7 @@ from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.experiment.in_process import InProcessRun
-from robot_formation.experiment.oracle import IdealRun, TargetFace
+from robot_formation.experiment.noise_floor import IdealRun, TargetFace
 from robot_formation.experiment.scenario import load_track, override, with_surface
 from robot_formation.experiment.sweep import Task, run_task
 from robot_formation.geometry.orientation import quaternion
