@@ -10,7 +10,10 @@ import argparse
 import math
 import os
 import sys
+from argparse import Namespace
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from alignment_grid import (
     equipment,
@@ -23,9 +26,10 @@ from alignment_grid import (
 )
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
+from robot_formation.calibration.alignment_trial import Start
 from robot_formation.errors import FormationError
 
-LINES = (
+LINES: tuple[tuple[str, Callable[[dict[str, Any]], str]], ...] = (
     ("good: u, v, heading within 1.5 cm, 1 cm, 6 deg, untouched, at most 14 moves", lambda s: f"{s['good']:.1%}"),
     ("says aligned", lambda s: f"{s['aligned']:.1%}"),
     ("lost", lambda s: f"{s['lost']:.1%}"),
@@ -39,17 +43,17 @@ LINES = (
 )
 
 
-def _pair(values, scale, digits):
+def _pair(values: Mapping[str, float], scale: float, digits: int) -> str:
     return f"{values['median'] * scale:.{digits}f} / {values['p95'] * scale:.{digits}f}"
 
 
-def attainable(jobs):
+def attainable(jobs: int) -> dict[Start, str]:
     made, grid = equipment("precise"), list(starts())
     found = run_parallel(faces_seen, ((made, start) for start in grid), jobs)
     return {start: faces for start, faces in zip(grid, found, strict=True) if faces}
 
 
-def run(args):
+def run(args: Namespace) -> None:
     modes = args.modes.split(",")
     made = {mode: equipment(mode, args.set) for mode in modes}
     faces = attainable(args.jobs)
@@ -72,7 +76,7 @@ def run(args):
         print(f"| {name} | " + " | ".join(cell(summary) for summary in summaries) + " |")
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--starts", type=int, default=1000)
     parser.add_argument("--modes", default="precise,paper")

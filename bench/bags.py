@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +62,7 @@ print(sent, full, elapsed)
 """
 
 
-def payloads(folder):
+def payloads(folder: Path) -> dict[str, list[bytes]]:
     """Some messages of both kinds: counters and noisy pictures, each kind of one size."""
     noise = np.random.default_rng(0)
     pictures = [noise.integers(0, 256, (208, 316, 3), dtype=np.uint8) for _ in range(16)]
@@ -74,16 +75,19 @@ def payloads(folder):
     return found
 
 
-def formation(environment, *arguments):
+def formation(environment: dict[str, str], *arguments: Path | str) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "robot_formation.cli", *map(str, arguments)]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def record(folder, environment, type_name, size, rate, seconds, compression):
+def record(
+    folder: Path, environment: dict[str, str], type_name: str, size: int, rate: float, seconds: float, compression: str
+) -> dict[str, float]:
     """Record a publisher; returns what came of it and the recorder's processor time while it recorded."""
     bag = folder / f"bag_{time.monotonic_ns()}"
     options = ["--compression", compression, "--json"]
     recorder = formation(environment, "record", "/data", "-o", bag, *options)
+    assert recorder.stderr is not None
     recorder.stderr.readline()
     before = processor_s(recorder.pid)
     file = folder / type_name.replace("/", "_")
@@ -116,7 +120,7 @@ def record(folder, environment, type_name, size, rate, seconds, compression):
     }
 
 
-def processor_s(pid):
+def processor_s(pid: int) -> float:
     """Processor time of a process and its threads, seconds."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
@@ -125,7 +129,7 @@ def processor_s(pid):
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def plain(folder, type_name, messages, count, compression):
+def plain(folder: Path, type_name: str, messages: Sequence[bytes], count: int, compression: str) -> dict[str, float]:
     """The mcap library's writer alone, fed in process."""
     kind = {"zstd": CompressionType.ZSTD, "none": CompressionType.NONE}[compression]
     began_s, began = used_s(), time.perf_counter()
@@ -146,12 +150,12 @@ def plain(folder, type_name, messages, count, compression):
     }
 
 
-def used_s():
+def used_s() -> float:
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_utime + usage.ru_stime
 
 
-def write_schedule(path, seconds):
+def write_schedule(path: Path, seconds: float) -> None:
     """A bag of 200 small messages per second on two topics, and 20 pictures per second."""
     tick, picture = (
         conversions.to_cdr(conversions.uint32(1)),
@@ -168,7 +172,7 @@ def write_schedule(path, seconds):
                 writer.write("/picture", picture, number * 10_000_000 + 6_000_000)
 
 
-def play(folder, environment, seconds, *, recorded):
+def play(folder: Path, environment: dict[str, str], seconds: float, *, recorded: bool) -> dict[str, float]:
     """Play a bag at rate 1, with nobody listening or with a recorder."""
     source = folder / "schedule"
     if not source.exists():
@@ -176,6 +180,7 @@ def play(folder, environment, seconds, *, recorded):
     target = folder / f"again_{recorded}"
     recorder = formation(environment, "record", "--all", "-o", target, "--json") if recorded else None
     if recorder:
+        assert recorder.stderr is not None
         recorder.stderr.readline()
     player = formation(environment, "play", source, "--wait", "20" if recorded else "0", "--json")
     report = json.loads(player.communicate()[0])
@@ -184,10 +189,11 @@ def play(folder, environment, seconds, *, recorded):
         recorder.communicate()
         with read_bag(target) as bag:
             assert bag.message_count == report["messages"]
-    return report["schedule_error"]
+    errors: dict[str, float] = report["schedule_error"]
+    return errors
 
 
-def row(name, found):
+def row(name: str, found: dict[str, float]) -> None:
     loss = (
         f"{found['dropped']} dropped, {found['lost']} lost, {found['sent'] - found['recorded']} missing"
         if "sent" in found
@@ -199,14 +205,14 @@ def row(name, found):
     )
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=5.0, help="of publishing per case")
     parser.add_argument("--small-rates", type=float, nargs="+", default=[2000.0, 8000.0, 16000.0], help="messages/s")
     parser.add_argument("--image-rates", type=float, nargs="+", default=[60.0, 300.0, 600.0], help="pictures/s")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    results = {}
+    results: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as name, DomainReservation() as domain:
         folder = Path(name)
         environment = node_environment(domain, folder)
@@ -221,18 +227,17 @@ def main():
                     results[f"formation record, {rate:g}/s: {kind}"] = record(
                         folder, environment, type_name, len(messages[0]), rate, args.seconds, compression
                     )
-        results["play"] = {
+        played = {
             "alone": play(folder, environment, 10.0, recorded=False),
             "with a recorder": play(folder, environment, 10.0, recorded=True),
         }
     if args.json:
-        print(json.dumps(results, indent=2))
+        print(json.dumps({**results, "play": played}, indent=2))
         return
     print("| what | messages/s | MB/s | processor us/message | processor ms/MB | loss |\n|---|---|---|---|---|---|")
     for name, found in results.items():
-        if name != "play":
-            row(name, found)
-    for name, found in results["play"].items():
+        row(name, found)
+    for name, found in played.items():
         print(f"play {name}: schedule error " + ", ".join(f"{key} {value:.3f}" for key, value in found.items()))
 
 

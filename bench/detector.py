@@ -16,10 +16,13 @@ import json
 import statistics
 import sys
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
+import numpy.typing as npt
+from cv2.typing import MatLike
 
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.pixy2.color_table import ColorTable
@@ -45,7 +48,7 @@ CALLS = 20
 FRAME_US = 16_200
 
 
-def hsv_ranges(signatures):
+def hsv_ranges(signatures: Sequence[Signature]) -> list[list[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]]:
     """Usual HSV limits (hue +-10 of 180, saturation and value from 80) around the taught colours, a list for each."""
     ranges = []
     for signature in signatures:
@@ -60,20 +63,22 @@ def hsv_ranges(signatures):
     return ranges
 
 
-def usual_pipeline(image, ranges):
+def usual_pipeline(
+    image: npt.NDArray[np.uint8], ranges: Sequence[Sequence[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]]
+) -> list[MatLike]:
     """Boxes (x, y, width, height, area) of the components of each colour's mask of at least 40 pixels."""
     hsv = cv2.cvtColor(image, cv2.COLOR_RGB2HSV)
     found = []
     for spans in ranges:
-        mask = cv2.inRange(hsv, *spans[0])
+        mask = cv2.inRange(hsv, *spans[0]).astype(np.uint8, copy=False)
         for span in spans[1:]:
-            mask |= cv2.inRange(hsv, *span)
+            mask |= cv2.inRange(hsv, *span).astype(np.uint8, copy=False)
         _, _, stats, _ = cv2.connectedComponentsWithStats(mask)
         found.append(stats[1:][stats[1:, cv2.CC_STAT_AREA] >= 40])
     return found
 
 
-def fastest_ms(call):
+def fastest_ms(call: Callable[[], object]) -> float:
     """Fastest of some calls, milliseconds."""
     best = float("inf")
     for _ in range(CALLS):
@@ -83,11 +88,13 @@ def fastest_ms(call):
     return best / 1e6
 
 
-def scene_picture(scene):
+def scene_picture(scene: str) -> npt.NDArray[np.uint8]:
     """The picture of a scene: an example, a grid of squares of the taught colours, or nothing but noise."""
     name, _ = SCENES[scene]
     if name:
-        image = cv2.cvtColor(cv2.imread(str(DATA / name)), cv2.COLOR_BGR2RGB)
+        stored = cv2.imread(str(DATA / name))
+        assert stored is not None
+        image = cv2.cvtColor(stored, cv2.COLOR_BGR2RGB).astype(np.uint8)
         return np.ascontiguousarray(np.repeat(image, 316 // image.shape[1], axis=1))
     rng = np.random.default_rng(1)
     if scene == "coloured noise":
@@ -96,10 +103,16 @@ def scene_picture(scene):
     for number in range(99):
         x, y = 8 + 28 * (number % 11), 5 + 22 * (number // 11)
         image[y : y + 12, x : x + 16] = ((196, 43, 43), (43, 161, 61), (43, 75, 201))[number % 3]
-    return np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+    drawn: npt.NDArray[np.uint8] = np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+    return drawn
 
 
-def measure(detector, image, ranges, rounds):
+def measure(
+    detector: BlockDetector,
+    image: npt.NDArray[np.uint8],
+    ranges: Sequence[Sequence[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]],
+    rounds: int,
+) -> list[float]:
     """Milliseconds of detection, detection with tracking, and the usual pipeline."""
     clock = itertools.count(FRAME_US, FRAME_US)
     calls = (
@@ -111,7 +124,7 @@ def measure(detector, image, ranges, rounds):
     return [statistics.median(column) for column in zip(*times, strict=True)]
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15, help="interleaved rounds per scene (default: 15)")
     parser.add_argument("--threads", type=int, help="threads of OpenCV (default: its own choice)")

@@ -11,8 +11,10 @@ Run: python bench/detector_errors.py [--rectangles 600] [--seed 1]
 
 import argparse
 import sys
+from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
@@ -32,13 +34,14 @@ CAMERA = {
 }
 
 
-def coverage(low, high, count):
+def coverage(low: float, high: float, count: int) -> npt.NDArray[np.float64]:
     """Share of each of `count` pixels that lies within [low, high]."""
     pixels = np.arange(count)
-    return np.clip(np.minimum(pixels + 1, high) - np.maximum(pixels, low), 0.0, 1.0)
+    share: npt.NDArray[np.float64] = np.clip(np.minimum(pixels + 1, high) - np.maximum(pixels, low), 0.0, 1.0)
+    return share
 
 
-def picture(rectangles, rng):
+def picture(rectangles: Sequence[tuple[float, float, float, float]], rng: np.random.Generator) -> npt.NDArray[np.uint8]:
     """Red rectangles (left, right, top, bottom) on grey, with noise."""
     image = np.broadcast_to(GREY, (208, 316, 3))
     for left, right, top, bottom in rectangles:
@@ -47,14 +50,16 @@ def picture(rectangles, rng):
     return np.clip(np.rint(image + rng.normal(0.0, SIGMA, image.shape)), 0, 255).astype(np.uint8)
 
 
-def rectangle(rng):
+def rectangle(rng: np.random.Generator) -> tuple[float, float, float, float]:
     """A random rectangle within the frame, left of its last quarter."""
     width, height = rng.uniform(12, 70, 2)
     left, top = rng.uniform(2, 230 - width), rng.uniform(2, 206 - height)
     return left, left + width, top, top + height
 
 
-def errors(detector, truth, image):
+def errors(
+    detector: BlockDetector, truth: tuple[float, float, float, float], image: npt.NDArray[np.uint8]
+) -> npt.NDArray[np.float64] | None:
     """Reported minus true left, right, top, bottom and centre of the leftmost block, or None if there is none."""
     boxes = sorted(detector.detect(image), key=lambda box: box.left)
     if not boxes:
@@ -65,7 +70,7 @@ def errors(detector, truth, image):
     return np.subtract(found, (left, right, top, bottom, (left + right) / 2, (top + bottom) / 2))
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rectangles", type=int, default=600, help="how many (default: 600)")
     parser.add_argument("--seed", type=int, default=1, help="seed of places, sizes and noise (default: 1)")

@@ -31,14 +31,16 @@ NEAR_EDGE_M = 1.70
 HEADINGS = {"uphill": math.pi / 2, "downhill": -math.pi / 2, "across": 0.0}
 
 
-def world_parameters(*, ideal, drive_mode="pwm_stop"):
-    values = {"motor.drive_mode": drive_mode, "camera.mode": "on_demand"}
+def world_parameters(*, ideal: bool, drive_mode: str = "pwm_stop") -> WorldParameters:
+    values: dict[str, str | float] = {"motor.drive_mode": drive_mode, "camera.mode": "on_demand"}
     if ideal:
         values.update({f"imperfections.{name}": 0.0 for name in specs(ImperfectionParameters)})
     return from_mapping(WorldParameters, values, where="bench")
 
 
-def drive(surface, start, parameters, angle_rad, axis, seed=0):
+def drive(
+    surface: str, start: RobotStart, parameters: WorldParameters, angle_rad: float, axis: str, seed: int = 0
+) -> dict[str, float]:
     """Turn all wheels by an angle along an axis; displacement (v, u, turn) of base_link in its frame at the start."""
     world = World(make_surface(surface), [start], parameters, seed=seed)
     before = world.ground_truth(start.name)
@@ -53,7 +55,7 @@ def drive(surface, start, parameters, angle_rad, axis, seed=0):
     return {"v": c * dx + s * dy, "u": s * dx - c * dy, "turn": turn}
 
 
-def fit(axis):
+def fit(axis: str) -> tuple[float, float, float]:
     """Constant and slope of wheel rotation [rad] on distance, and the largest distance error of the line."""
     parameters = world_parameters(ideal=True)
     start = RobotStart("follower_1", MIDDLE_M, MIDDLE_M, 0.0, camera=False)
@@ -64,7 +66,7 @@ def fit(axis):
     return constant, slope, np.abs((angles - constant) / slope - driven).max()
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--robots", type=int, default=100, help="robots (seeds) of the spread (default: 100)")
     robots = max(2, parser.parse_args().robots)

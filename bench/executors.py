@@ -8,10 +8,12 @@ Run: python bench/executors.py [--messages N]
 import argparse
 import os
 import time
+from collections.abc import Callable
+from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import UInt32
 
@@ -19,7 +21,7 @@ from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.nodes.host.executor import make_executor
 
 
-def microseconds_per_callback(make, domain, messages):
+def microseconds_per_callback(make: Callable[..., Executor], domain: int, messages: int) -> float:
     context = Context()
     rclpy.init(context=context, domain_id=domain)
     node = Node("executor_bench", context=context)
@@ -28,7 +30,7 @@ def microseconds_per_callback(make, domain, messages):
     publisher = node.create_publisher(UInt32, "number", 10)
     last = 0
 
-    def take(message):
+    def take(message: Any) -> None:
         nonlocal last
         last = message.data
         if last < messages:
@@ -48,7 +50,7 @@ def microseconds_per_callback(make, domain, messages):
     return elapsed / messages * 1e6
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--messages", type=int, default=5000)
     args = parser.parse_args()

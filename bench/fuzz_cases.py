@@ -1,18 +1,22 @@
 """The cases of fuzz_inputs.py: what is damaged, and how. Everything follows from the generator that a case is given."""
 
+from __future__ import annotations
+
 import functools
 import json
 import os
 import struct
 import sys
 import zlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "test"))
+sys.path.insert(0, str(ROOT / "test" / "helpers"))
 
 NASTY = (
     *("", " ", "~", "null", "true", "no", "0", "-1", "1e3", "1e999", "-1e-999", ".nan", ".inf", "-.inf", "0x_", "0b2"),
@@ -65,7 +69,7 @@ class Case:
     arguments: list[str]
 
 
-def make_case(rng, number, folder):
+def make_case(rng: np.random.Generator, number: int, folder: Path) -> Case:
     """Make a case of a number in a folder of its own."""
     names = list(KINDS)
     weights = np.array([weight for _, weight in KINDS.values()], float)
@@ -74,15 +78,15 @@ def make_case(rng, number, folder):
     return Case(kind, [str(word) for word in make(rng, folder)])
 
 
-def pick(rng, items):
+def pick(rng: np.random.Generator, items: Sequence[Any]) -> Any:
     """Choose one of them."""
-    return items[rng.integers(len(items))]
+    return items[int(rng.integers(len(items)))]
 
 
 # What is done to texts and bytes.
 
 
-def damaged_text(rng, text):
+def damaged_text(rng: np.random.Generator, text: str) -> str:
     """Change a text in one to four places."""
     for _ in range(rng.integers(1, 5)):
         at = int(rng.integers(len(text) + 1))
@@ -112,9 +116,9 @@ def damaged_text(rng, text):
     return text[:300_000]
 
 
-def damaged_bytes(rng, data, low=0):
+def damaged_bytes(rng: np.random.Generator, content: bytes, low: int = 0) -> bytes:
     """Change bytes from `low` on: flips, numbers, cuts, insertions."""
-    data = bytearray(data)
+    data = bytearray(content)
     for _ in range(rng.integers(1, 6)):
         at = int(rng.integers(low, max(low + 1, len(data))))
         kind = rng.integers(7)
@@ -135,7 +139,7 @@ def damaged_bytes(rng, data, low=0):
     return bytes(data)
 
 
-def bomb(rng):
+def bomb(rng: np.random.Generator) -> str:
     """Write a YAML text whose aliases stand for billions of values."""
     width, depth = int(rng.integers(2, 12)), int(rng.integers(3, 30))
     key = pick(rng, KEYS)
@@ -143,7 +147,7 @@ def bomb(rng):
     return "\n".join([*lines, f"{key}: *a{depth - 1}"])
 
 
-def odd_file(rng, folder, name, content):
+def odd_file(rng: np.random.Generator, folder: Path, name: str, content: bytes) -> Path:
     """Write a file, or now and then put something else in its place; return its path."""
     path = folder / name
     kind = rng.integers(60)
@@ -168,7 +172,7 @@ def odd_file(rng, folder, name, content):
     return path
 
 
-def encoded(rng, text):
+def encoded(rng: np.random.Generator, text: str) -> bytes:
     """Write a text as bytes, seldom as others than UTF-8."""
     encoding = "utf-16" if rng.random() < 0.02 else "utf-8"
     return text.encode(encoding, errors="replace")
@@ -178,14 +182,14 @@ def encoded(rng, text):
 
 
 @functools.cache
-def scenario_texts():
+def scenario_texts() -> list[str]:
     """The scenarios and parameter files of config/."""
     files = [*(ROOT / "config" / "scenarios").glob("*.yaml"), ROOT / "config" / "predictor.yaml"]
     return [file.read_text(encoding="utf-8") for file in sorted(files)]
 
 
 @functools.cache
-def parameter_names():
+def parameter_names() -> list[str]:
     """All names that --set takes."""
     from robot_formation.components import catalogue
     from robot_formation.experiment.scenario import Setup
@@ -197,7 +201,7 @@ def parameter_names():
     ]
 
 
-def scenario(rng, folder):
+def scenario(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """A scenario file, damaged or made up."""
     way = rng.integers(10)
     if way == 0:
@@ -211,7 +215,7 @@ def scenario(rng, folder):
     return ["scenario", odd_file(rng, folder, "scenario.yaml", encoded(rng, text)), *setting(rng, 0.2)]
 
 
-def setting(rng, probability=1.0):
+def setting(rng: np.random.Generator, probability: float = 1.0) -> list[str]:
     """KEY=VALUE, usually wrong."""
     if rng.random() > probability:
         return []
@@ -220,7 +224,7 @@ def setting(rng, probability=1.0):
     return [f"{key}={value}" if rng.random() < 0.95 else value]
 
 
-def settings(rng, folder):
+def settings(rng: np.random.Generator, folder: Path) -> list[str]:
     """Settings of a preset."""
     return ["scenario", "", *(word for _ in range(rng.integers(1, 4)) for word in setting(rng))]
 
@@ -228,7 +232,7 @@ def settings(rng, folder):
 # Logs.
 
 
-def log(rng, folder):
+def log(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """A log of displacements."""
     columns = ["u_m", "v_m", "residual_u_m", "residual_v_m", "commanded_u_m", "commanded_v_m"][
         : pick(rng, (2, 4, 6, 6))
@@ -254,7 +258,7 @@ def log(rng, folder):
 
 
 @functools.cache
-def base_bags():
+def base_bags() -> dict[str, dict[str, bytes]]:
     """Bags to damage, as files by name: ours in chunks with and without compression, and an SQLite one of rosbags."""
     import tempfile
 
@@ -286,14 +290,14 @@ def base_bags():
     return made
 
 
-def contents(folder):
+def contents(folder: Path) -> dict[str, bytes]:
     """A folder's files by name."""
     return {file.name: file.read_bytes() for file in sorted(folder.iterdir())}
 
 
-def unchecked(data):
+def unchecked(content: bytes) -> bytes:
     """Take the check sums out of an MCAP file's chunks and its end, so that damage within is not found by them."""
-    data = bytearray(data)
+    data = bytearray(content)
     at = 8
     while at + 9 <= len(data):
         kind, (length,) = data[at], struct.unpack_from("<Q", data, at + 1)
@@ -305,7 +309,7 @@ def unchecked(data):
     return bytes(data)
 
 
-def bag(rng, folder):
+def bag(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """A bag with a damaged file, and a verb that reads it."""
     kind = pick(rng, ("none", "none", "none", "zstd", "lz4", "sqlite"))
     files = dict(base_bags()[kind])
@@ -333,13 +337,16 @@ def bag(rng, folder):
 DETAILS = ("parameters", "versions", "seed", "timesteps", "dropped", "lost", "outcome")
 
 
-def run_details(rng, folder):
+def run_details(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """A whole bag whose metadata says other things of the run than a run does."""
     from robot_formation.bag.writer import BagWriter
     from synthetic_bag import Step, SyntheticRun
 
-    groups = {"world": {"robots": ["leader", "follower_1"], "marker.top_m": 0.216}, "fine_tuner": {"mode": "paper"}}
-    odd = (None, 5, -1, 1e300, True, "x", "\ud800", [], [[]], {}, {"a": {}}, *NASTY)
+    groups: dict[str, dict[str, Any]] = {
+        "world": {"robots": ["leader", "follower_1"], "marker.top_m": 0.216},
+        "fine_tuner": {"mode": "paper"},
+    }
+    odd: tuple[Any, ...] = (None, 5, -1, 1e300, True, "x", "\ud800", [], [[]], {}, {"a": {}}, *NASTY)
     for group in groups.values():
         for name in group:
             group[name] = pick(rng, odd) if rng.random() < 0.5 else group[name]
@@ -362,7 +369,7 @@ def run_details(rng, folder):
     return reading(rng, path, folder)
 
 
-def reading(rng, path, folder):
+def reading(rng: np.random.Generator, path: Path, folder: Path) -> list[Path | str]:
     """A verb that reads a bag."""
     verb = pick(rng, RECEIVERS)
     json_too = ["--json"] if rng.random() < 0.4 else []
@@ -378,7 +385,7 @@ def reading(rng, path, folder):
     return [verb, path, *options.get(verb, []), *json_too]
 
 
-def damage_table(rng, path):
+def damage_table(rng: np.random.Generator, path: Path) -> None:
     """Put other values into a database's cells: SQLite takes any."""
     import sqlite3
 
@@ -413,7 +420,7 @@ def damage_table(rng, path):
 
 
 @functools.cache
-def zstd_bomb():
+def zstd_bomb() -> list[bytes]:
     """Frames of a gigabyte of zeros: one that says so, and one that doesn't."""
     import zstandard
 
@@ -425,7 +432,7 @@ def zstd_bomb():
     return frames
 
 
-def packed_bag(rng, folder):
+def packed_bag(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """A bag whose files or chunks unpack to gigabytes, or that is compressed as a whole and damaged."""
     import zstandard
 
@@ -455,7 +462,7 @@ def packed_bag(rng, folder):
     return reading(rng, path / name, folder)
 
 
-def indexed(data, at, length, said, packed):
+def indexed(data: bytearray, at: int, length: int, said: int, packed: int) -> bytes:
     """The summary of an MCAP file for one chunk: its own schemas and channels, an index, statistics, a footer."""
     summary_start = struct.unpack_from("<Q", data, len(data) - 28)[0]
     kept, place = b"", summary_start
@@ -476,19 +483,20 @@ def indexed(data, at, length, said, packed):
 
 
 @functools.cache
-def pictures():
+def pictures() -> dict[str, bytes]:
     """Encoded pictures by suffix."""
     import cv2
 
     first = cv2.imread(str(ROOT / "test" / "data" / "pixy2" / "G1_teach_region.webp"))
+    assert first is not None
     suffixes = (".png", ".jpg", ".webp", ".bmp", ".tiff", ".ppm")
     return {suffix: cv2.imencode(suffix, first)[1].tobytes() for suffix in suffixes}
 
 
-def png(width, height, depth, colour, data):
+def png(width: int, height: int, depth: int, colour: int, data: bytes) -> bytes:
     """Write a PNG file of these numbers and packed data."""
 
-    def chunk(kind, content):
+    def chunk(kind: bytes, content: bytes) -> bytes:
         check_sum = struct.pack(">I", zlib.crc32(kind + content))
         return struct.pack(">I", len(content)) + kind + content + check_sum
 
@@ -497,13 +505,13 @@ def png(width, height, depth, colour, data):
 
 
 @functools.cache
-def deflate_bomb():
+def deflate_bomb() -> bytes:
     """A gigabyte of zeros."""
     packer = zlib.compressobj(1)
     return b"".join(packer.compress(bytes(1 << 24)) for _ in range(64)) + packer.flush()
 
 
-def picture_file(rng, folder):
+def picture_file(rng: np.random.Generator, folder: Path) -> Path:
     """A picture, damaged, or one that claims to be huge."""
     way = rng.integers(20)
     suffix = pick(rng, list(pictures()))
@@ -522,7 +530,7 @@ def picture_file(rng, folder):
     return odd_file(rng, folder, f"picture{suffix}", content)
 
 
-def picture(rng, folder):
+def picture(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """A picture in which blocks are looked for, or a colour taught."""
     path = picture_file(rng, folder)
     json_too = ["--json"] if rng.random() < 0.5 else []
@@ -534,7 +542,7 @@ def picture(rng, folder):
 
 
 @functools.cache
-def good_picture():
+def good_picture() -> Path:
     """A picture that can be read."""
     import tempfile
 
@@ -543,7 +551,7 @@ def good_picture():
     return path
 
 
-def signatures(rng, folder):
+def signatures(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """Signatures, or parameters of the detector by our names or PixyMon's."""
     taught = (ROOT / "config" / "signatures.yaml").read_text()
     own = "min_block_area: 20\nsignature_1_range: 3.5\nblock_filtering: 10\nMax tracking distance: 40\n"
@@ -559,7 +567,7 @@ def signatures(rng, folder):
     return ["detect", good_picture(), "--signatures", ROOT / "config" / "signatures.yaml", "--parameters", path]
 
 
-def calibration(rng, folder):
+def calibration(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """A calibration of motors or of a camera, in use by a scenario."""
     motors = (
         "robots:\n  leader: {v: [0.0, 20.0, 1.0], u: [0.0, 21.0], turn: [0.0, 3.0]}\n  follower_1: {v: [0.0, 20.0]}\n"
@@ -572,7 +580,7 @@ def calibration(rng, folder):
     return ["scenario", "", f"{('drive', 'fine_tuner')[kind]}.calibration_file={path}"]
 
 
-def height_map(rng, folder):
+def height_map(rng: np.random.Generator, folder: Path) -> list[str]:
     """A height map as PNG or NPY, in use by a scenario."""
     edge = int(pick(rng, (4, 5, 16, 64)))
     if rng.random() < 0.5:
@@ -593,7 +601,7 @@ def height_map(rng, folder):
     return ["scenario", "", "world.surface=heightmap", f"world.surface_parameters=[file={path}{scale}]"]
 
 
-def sweep_folder(rng, folder):
+def sweep_folder(rng: np.random.Generator, folder: Path) -> list[Path | str]:
     """A folder of a sweep that was begun."""
     from dataclasses import fields
 
@@ -637,7 +645,7 @@ _OPTIONS = (
 )
 
 
-def arguments(rng, folder):
+def arguments(rng: np.random.Generator, folder: Path) -> list[str]:
     """Verbs with options and words at random."""
     start = rng.random() < 0.4
     verb = pick(rng, _STARTING if start else _FINISHING)
@@ -649,7 +657,7 @@ def arguments(rng, folder):
     return ["parse", *words] if start or words[0] not in _FINISHING else words
 
 
-KINDS = {
+KINDS: dict[str, tuple[Callable[[np.random.Generator, Path], Sequence[Path | str]], int]] = {
     "scenario file": (scenario, 16),
     "settings": (settings, 12),
     "log": (log, 10),

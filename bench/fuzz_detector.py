@@ -7,6 +7,8 @@ the warm-up (the first tenth of the time, at least 500 cases) and the end: if th
 Run: python bench/fuzz_detector.py [--minutes 10] [--cases N] [--seed N] [--limit-mb 16]
 """
 
+from __future__ import annotations
+
 import argparse
 import array
 import contextlib
@@ -18,10 +20,13 @@ import tempfile
 import time
 import traceback
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 import yaml
 from sensor_msgs.msg import Image
 
@@ -41,7 +46,7 @@ ENCODINGS = ("rgb8", "bgr8", "rgb8", "bgr8", "mono8", "rgba8", "16UC1", "bayer_b
 SIZES = (0, 1, 2, 3, 7, 104, 158, 208, 315, 316, 317, 632, 948, 1000, 2**15, 2**16, 2**31, 2**32 - 1)
 FORMATS = (".png", ".jpg", ".webp", ".bmp", ".tiff", ".ppm")
 NUMBERS = (0, -1, 1, 2**31, -(2**31), 2**63, 10**400, 0.5, 1e308)
-OTHERS = ("", "1", "a\nb", None, True, [], [5.0, 6.0], [None], {}, {"a": {"b": 1}}, [[1]], ["x"] * 100)
+OTHERS: tuple[Any, ...] = ("", "1", "a\nb", None, True, [], [5.0, 6.0], [None], {}, {"a": {"b": 1}}, [[1]], ["x"] * 100)
 VALUES = NUMBERS + OTHERS
 LARGEST = 4_000_000
 WARM_UP_CASES = 500
@@ -50,22 +55,32 @@ WARM_UP_CASES = 500
 class Fuzzer:
     """Makes cases from a seed and counts how they end."""
 
-    def __init__(self, seed, folder):
+    def __init__(self, seed: int, folder: Path) -> None:
         self.rng = np.random.default_rng(seed)
         self.folder = folder
-        self.outcomes = Counter()
-        self.failures = []
+        self.outcomes: Counter[str] = Counter()
+        self.failures: list[str] = []
         self.component = BlockDetectorComponent(BlockDetectorNodeParameters(), Place("follower_1"))
         self.component.attach(lambda topic, message: self.sent.append(topic.name), lambda level, text: None)
-        self.sent = []
+        self.sent: list[str] = []
         self.stamp_ns = 0
-        picture = cv2.imread(str(DATA / "seqA_20.webp"))
+        stored = cv2.imread(str(DATA / "seqA_20.webp"))
+        assert stored is not None
+        picture = stored.astype(np.uint8, copy=False)
         self.pictures = [picture, np.repeat(picture, 2, axis=1), np.zeros((3, 2, 3), np.uint8)]
         self.encoded = [
-            cv2.imencode(extension, picture)[1].ravel() for extension in FORMATS for picture in self.pictures
+            cv2.imencode(extension, picture)[1].ravel().astype(np.uint8, copy=False)
+            for extension in FORMATS
+            for picture in self.pictures
         ]
 
-    def run_one(self):
+    def detector(self) -> BlockDetector:
+        """The component's detector of colours."""
+        detector = self.component._detector
+        assert isinstance(detector, BlockDetector)
+        return detector
+
+    def run_one(self) -> None:
         """One case of a random kind; what must not be raised is kept."""
         kinds = (self.message, self.message, self.image_file, self.signatures_file, self.parameters_file)
         kind = kinds[self.rng.integers(len(kinds))]
@@ -82,9 +97,11 @@ class Fuzzer:
             self.failures.append(f"{kind.__name__}:\n{traceback.format_exc()}")
         self.outcomes[f"{kind.__name__} {outcome}"] += 1
 
-    def message(self):
+    def message(self) -> str:
         """An image message with random header, size, encoding and data."""
         rng = self.rng
+        width: int | np.int64
+        height: int | np.int64
         if rng.random() < 0.6:
             width, height = rng.integers(1, 700), rng.integers(1, 500)
         else:
@@ -107,7 +124,7 @@ class Fuzzer:
         self.component.inputs()[0].handler(message)
         return "answered" if self.sent else "dropped"
 
-    def _data(self, size):
+    def _data(self, size: int) -> bytes:
         """Bytes of noise, of one value, or of a picture over and over."""
         draw = self.rng.random()
         if draw < 0.3:
@@ -117,20 +134,20 @@ class Fuzzer:
         content = self.pictures[1].tobytes()
         return (content * (size // len(content) + 1))[:size]
 
-    def image_file(self):
+    def image_file(self) -> str:
         """An image file that is cut off, bit-flipped, spliced or nothing but noise; detect, and sometimes teach."""
         content = self._damaged(self.encoded[self.rng.integers(len(self.encoded))])
         path = self.folder / "case.img"
         path.write_bytes(content)
         picture = read_picture(path, lambda text: None)
-        self.component._detector.detect(picture)
+        self.detector().detect(picture)
         if self.rng.random() < 0.3:
             x, y, width, height = (int(value) for value in self.rng.integers(-5, 330, 4))
             teach_region(picture, (x, y, width, height), 1)
             teach_point(picture, (x, y), int(self.rng.integers(0, 10001)), 1)
         return "read"
 
-    def signatures_file(self):
+    def signatures_file(self) -> str:
         """A file of signatures with random bounds, damaged or not; the detector is built from it and used."""
         listed = [dict(s) for s in EXAMPLES["groups"]["G1"]["signatures"]]
         for signature in listed:
@@ -142,7 +159,7 @@ class Fuzzer:
         detector.detect(cv2.resize(self.pictures[1], (316, 208)))
         return "read"
 
-    def parameters_file(self):
+    def parameters_file(self) -> str:
         """A file of parameters with random names and values, damaged or not; the detector is built from it and used."""
         names = (
             *DetectorParameters.__dataclass_fields__,
@@ -155,19 +172,20 @@ class Fuzzer:
         values = {self._pick(names): self._value() for _ in range(self.rng.integers(0, 5))}
         path = self._write(values if self.rng.random() < 0.9 else self._value())
         parameters = read_parameters(path, lambda text: None)
-        self.component._detector.configure(self.component._detector.signatures, parameters)
+        detector = self.detector()
+        detector.configure(detector.signatures, parameters)
         return "read"
 
-    def _write(self, content):
+    def _write(self, content: Any) -> Path:
         text = json.dumps(content) if self.rng.random() < 0.5 else yaml.safe_dump(content)
         data = text.encode()
         if self.rng.random() < 0.4:
             data = self._damaged(np.frombuffer(data, np.uint8))
-        path = self.folder / self._pick(("case.yaml", "case.json"))
+        path: Path = self.folder / self._pick(("case.yaml", "case.json"))
         path.write_bytes(data)
         return path
 
-    def _damaged(self, content):
+    def _damaged(self, content: npt.NDArray[np.uint8]) -> bytes:
         rng = self.rng
         draw = rng.random()
         if draw < 0.1:
@@ -185,27 +203,34 @@ class Fuzzer:
             damaged = np.concatenate([damaged[start:], damaged[:start], damaged])
         return damaged.tobytes()
 
-    def _value(self):
+    def _value(self) -> Any:
         """A value of any kind that YAML and JSON know, mostly a number."""
         if self.rng.random() < 0.4:
             return int(self.rng.integers(-40000, 40000))
         return self._pick(VALUES)
 
-    def _pick(self, choices):
+    def _pick(self, choices: tuple[Any, ...]) -> Any:
         return choices[self.rng.integers(len(choices))]
 
 
-def resident_mb():
+def resident_mb() -> float:
     """Resident set of this process, megabytes."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def fuzz(fuzzer, *, minutes=None, cases=None, say=lambda text: None):
+def _silent(text: str) -> None:
+    """Take no notice."""
+
+
+def fuzz(
+    fuzzer: Fuzzer, *, minutes: float | None = None, cases: int | None = None, say: Callable[[str], None] = _silent
+) -> tuple[int, float, float, float]:
     """Run for some minutes or cases; return the cases done and the megabytes after warm-up, at most and at the end."""
     began = reported = time.monotonic()
     end = began + 60.0 * minutes if minutes else float("inf")
-    done, warm, most = 0, None, 0.0
+    done, most = 0, 0.0
+    warm: float | None = None
     while (cases is None or done < cases) and time.monotonic() < end and len(fuzzer.failures) < 5:
         fuzzer.run_one()
         done += 1
@@ -221,7 +246,7 @@ def fuzz(fuzzer, *, minutes=None, cases=None, say=lambda text: None):
     return done, warm if warm is not None else resident_mb(), most, resident_mb()
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=10.0, help="how long (default: 10)")
     parser.add_argument("--cases", type=int, help="a fixed number of cases instead")

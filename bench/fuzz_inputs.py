@@ -10,6 +10,8 @@ loaded and checked, and arguments of these verbs are parsed.
 Run: python bench/fuzz_inputs.py [--cases 10000] [--seed 0] [--jobs 2] [--keep DIR]; one case again: --only NUMBER.
 """
 
+from __future__ import annotations
+
 import argparse
 import contextlib
 import faulthandler
@@ -24,7 +26,12 @@ import sys
 import tempfile
 import time
 import traceback
+from argparse import Namespace
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +61,7 @@ def perform(case: Case) -> int:
     return main(case.arguments)
 
 
-def use_scenario(words):
+def use_scenario(words: Sequence[str]) -> int:
     """Load a scenario, set values, check it, and collect the parameters of all its nodes, as `run` does."""
     from robot_formation.errors import FormationError
     from robot_formation.experiment import scenario as scenarios
@@ -73,7 +80,7 @@ def use_scenario(words):
     return 0
 
 
-def use_sweep_table(words):
+def use_sweep_table(words: Sequence[str]) -> int:
     """Open a sweep's folder as `sweep` does before it runs anything."""
     from robot_formation.errors import FormationError
     from robot_formation.experiment.sweep import Plan, Table
@@ -89,7 +96,7 @@ def use_sweep_table(words):
     return 0
 
 
-def judged(case, code, out, err):
+def judged(case: Case, code: int, out: str, err: str) -> str:
     """Return what is wrong with how a case ended, or nothing."""
     if code not in (0, 2, 3):
         return f"exit code {code}"
@@ -108,12 +115,12 @@ def judged(case, code, out, err):
     return ""
 
 
-def argparse_said(line):
+def argparse_said(line: str) -> bool:
     """Tell lines that argparse prints, which repeats arguments in full."""
     return line.startswith(("usage:", " ")) or ": error: " in line
 
 
-def run_case(seed, number, folder):
+def run_case(seed: int, number: int, folder: Path) -> dict[str, Any]:
     """Run one case in this process; return what is known of it."""
     case = make_case(np.random.default_rng([seed, number]), number, folder)
     out, err = io.StringIO(), io.StringIO()
@@ -141,19 +148,19 @@ def run_case(seed, number, folder):
     return result
 
 
-def reset_peak():
+def reset_peak() -> None:
     """Set the kernel's record of this process's largest resident set back."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
 
 
-def peak_mb():
+def peak_mb() -> float:
     """Largest resident set since then, megabytes."""
     found = re.search(r"VmHWM:\s+(\d+) kB", Path("/proc/self/status").read_text())
     return int(found[1]) / 1024 if found else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def work(pipe, seed, folder, wall_s):
+def work(pipe: Connection, seed: int, folder: Path, wall_s: float) -> None:
     """Serve case numbers until None comes."""
     resource.setrlimit(resource.RLIMIT_AS, (ADDRESS_SPACE_BYTES, ADDRESS_SPACE_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -176,12 +183,12 @@ def work(pipe, seed, folder, wall_s):
 class Worker:
     """A process that runs cases, one at a time."""
 
-    def __init__(self, context, options, folder):
+    def __init__(self, context: SpawnContext, options: Namespace, folder: Path) -> None:
         self.context, self.options, self.folder = context, options, folder
-        self.number = None
+        self.number = 0
         self.start()
 
-    def start(self):
+    def start(self) -> None:
         """Begin a new process."""
         self.done = 0
         self.pipe, theirs = self.context.Pipe()
@@ -191,7 +198,7 @@ class Worker:
         self.process.start()
         theirs.close()
 
-    def give(self, number):
+    def give(self, number: int) -> None:
         """Hand a case out."""
         if self.done >= CASES_PER_PROCESS:
             self.end()
@@ -199,19 +206,20 @@ class Worker:
         self.number, self.since = number, time.monotonic()
         self.pipe.send(number)
 
-    def result(self):
+    def result(self) -> dict[str, Any] | None:
         """Return how the case ended, None while it runs."""
         try:
             if self.pipe.poll():
                 self.done += 1
-                return self.pipe.recv()
+                result: dict[str, Any] = self.pipe.recv()
+                return result
         except (EOFError, OSError):
             return self.broken(f"the process died with {self.process.exitcode}")
         if time.monotonic() - self.since > self.options.wall_s:
             return self.broken(f"no end after {self.options.wall_s:g} s")
         return None
 
-    def broken(self, why):
+    def broken(self, why: str) -> dict[str, Any]:
         """Replace the process; return the case as failed."""
         self.process.kill()
         self.process.join()
@@ -225,7 +233,7 @@ class Worker:
         found = {"number": self.number, "kind": case.kind, "arguments": case.arguments, "code": None, "said": ""}
         return {**found, "wall_s": elapsed, "cpu_s": elapsed, "peak_mb": 0.0, "wrong": why}
 
-    def end(self):
+    def end(self) -> None:
         """End the process."""
         with contextlib.suppress(OSError):
             self.pipe.send(None)
@@ -233,7 +241,9 @@ class Worker:
         self.process.kill()
 
 
-def run_all(options, numbers, tell=lambda result: None):
+def run_all(
+    options: Namespace, numbers: Sequence[int], tell: Callable[[dict[str, Any]], None] = lambda result: None
+) -> list[dict[str, Any]]:
     """Run the cases; return the results in the order of their ends."""
     context = multiprocessing.get_context("spawn")
     results = []
@@ -263,7 +273,7 @@ def run_all(options, numbers, tell=lambda result: None):
     return results
 
 
-def finish(result, worker, options):
+def finish(result: dict[str, Any], worker: Worker, options: Namespace) -> None:
     """Judge time and memory, keep the files of a failure, remove the others."""
     if not result["wrong"] and result["cpu_s"] > options.cpu_s:
         result["wrong"] = f"{result['cpu_s']:.1f} s of processor time"
@@ -279,12 +289,12 @@ def finish(result, worker, options):
     shutil.rmtree(place, ignore_errors=True)
 
 
-def not_a_file(folder, names):
+def not_a_file(folder: str, names: Sequence[str]) -> list[str]:
     """Name what can't be copied: named pipes and links to devices."""
     return [name for name in names if not Path(folder, name).is_file() and not Path(folder, name).is_dir()]
 
 
-def table(results):
+def table(results: Sequence[dict[str, Any]]) -> str:
     """Write the results as a table, a line per kind."""
     lines = [
         "| kind | cases | done | refused | failures | slowest (s) | largest (MB) |",
@@ -302,7 +312,7 @@ def table(results):
     return "\n".join(lines)
 
 
-def report(result, seed):
+def report(result: dict[str, Any], seed: int) -> str:
     """Write a failure with the command that repeats it."""
     number, words = result["number"], " ".join(map(repr, result["arguments"]))
     return (
@@ -311,7 +321,7 @@ def report(result, seed):
     )
 
 
-def parsed(arguments=None):
+def parsed(arguments: Sequence[str] | None = None) -> Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=10_000)
@@ -326,14 +336,14 @@ def parsed(arguments=None):
     return parser.parse_args(arguments)
 
 
-def main():
+def main() -> int:
     """Run the cases and print the table and the failures; return 1 if there are any."""
     options = parsed()
     numbers = options.only or range(options.first, options.first + options.cases)
     started = time.monotonic()
     count = 0
 
-    def tell(result):
+    def tell(result: dict[str, Any]) -> None:
         nonlocal count
         count += 1
         if result["wrong"]:

@@ -21,7 +21,7 @@ AIM_TIMESTEPS = 400
 SETTINGS = ("leader.step_m=0.004",)
 
 
-def bag_mb(timesteps, folder):
+def bag_mb(timesteps: int, folder: Path) -> float:
     scenario = scenarios.override(scenarios.load_track("one"), [*SETTINGS, f"leader.timesteps={timesteps}"])
     bag = folder / f"bag_{timesteps}"
     result = run_in_process(scenario, bag, run_metadata(scenario))
@@ -30,7 +30,7 @@ def bag_mb(timesteps, folder):
     return sum(path.stat().st_size for path in bag.iterdir()) / 1e6
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--timesteps", default="100,200,400", help="numbers of timesteps, separated by commas")
     parser.add_argument("--json", action="store_true", help="print JSON")

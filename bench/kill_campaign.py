@@ -30,6 +30,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 TIMESTEPS = 4
@@ -103,6 +104,7 @@ class Command:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
+            assert self.process.stdout is not None
             source = os.dup(self.process.stdout.fileno())
         self._reader = threading.Thread(target=self._read, args=(source, not terminal), daemon=True)
         self._reader.start()
@@ -312,10 +314,11 @@ def timesteps_in(bag: Path, problems: list[str]) -> list[object] | None:
     if analysis is None:
         problems.append("analyze can't read the bag")
         return None
-    return analysis["timesteps"]
+    timesteps: list[object] = analysis["timesteps"]
+    return timesteps
 
 
-def json_of(verb: str, bag: Path) -> dict | None:
+def json_of(verb: str, bag: Path) -> dict[str, Any] | None:
     """What a verb says of a bag."""
     command = [str(ROOT / "formation"), verb, str(bag), "--json"]
     completed = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -366,6 +369,7 @@ def _send(case: Case, command: Command) -> None:
     # A terminal's Ctrl-C reaches every process of its foreground group.
     with contextlib.suppress(ProcessLookupError):
         if case.kind == "closed terminal":
+            assert command.master is not None
             os.close(command.master)
             command.master = None
         elif case.kind in ("SIGTERM", "SIGHUP"):
@@ -382,10 +386,10 @@ def check_leftovers(outcome: Outcome, command: Command, folder: Path) -> None:
     end = time.monotonic() + 10.0
     while any(map(alive, command.pids)) and time.monotonic() < end:
         time.sleep(0.1)  # loky's resource tracker ends a moment after the sweep
-    if left := [pid for pid in command.pids if alive(pid)]:
-        outcome.problems.append(f"processes left: {left}")
-    if left := [path.name for path in folder.glob("robot_formation_*")]:
-        outcome.problems.append(f"temporary folders left: {left}")
+    if living := [pid for pid in command.pids if alive(pid)]:
+        outcome.problems.append(f"processes left: {living}")
+    if folders := [path.name for path in folder.glob("robot_formation_*")]:
+        outcome.problems.append(f"temporary folders left: {folders}")
     left = [name for name in command.shared if Path("/dev/shm", name).exists() and not _SHARED_BY_ALL.search(name)]
     if left:
         outcome.problems.append(f"shared memory left: {left}")

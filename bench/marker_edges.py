@@ -11,12 +11,15 @@ import argparse
 import math
 import os
 from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from alignment_grid import equipment
 from robot_formation import names
+from robot_formation.alignment.observation import FaceBox
 from robot_formation.alignment.precise.marker_edges import (
     Edge,
     EdgeParameters,
@@ -25,12 +28,14 @@ from robot_formation.alignment.precise.marker_edges import (
 )
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel
 from robot_formation.batch.pool import run_parallel
-from robot_formation.calibration.alignment_trial import FOLLOWER, Start, poses
+from robot_formation.calibration.alignment_trial import FOLLOWER, Equipment, Start, poses
 from robot_formation.vision.marker import Face
+from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.picture import WIDTH
 from robot_formation.world.checks import WorldError
 from robot_formation.world.events import Frame
+from robot_formation.world.pose import Pose
 from robot_formation.world.world import World
 
 MODEL, EDGES = MarkerModel(GeometryParameters()), EdgeParameters()
@@ -38,19 +43,23 @@ OUTER = {Face.FRONT: "right", Face.REAR: "left"}
 NAMES = {Face.TARGET: "Target", Face.FRONT: "Front", Face.REAR: "Rear"}
 
 
-def near(rng):
+Place = tuple[float, float, float]
+Look = tuple[npt.NDArray[np.float64], Mapping[Face, FaceBox]]
+
+
+def near(rng: np.random.Generator) -> Place:
     """Neighbour ahead [m], to the left [m], yaw [rad]: near the formation and nearly parallel."""
     return rng.uniform(-0.17, 0.17), rng.uniform(0.29, 0.37), math.radians(rng.uniform(-9.0, 9.0))
 
 
-def anywhere(rng):
+def anywhere(rng: np.random.Generator) -> Place:
     """Neighbour ahead [m], to the left [m], yaw [rad]: anywhere in view."""
     left, bearing = rng.uniform(0.3, 0.75), rng.uniform(-0.45, 0.45)
     return (left - 0.04) * math.tan(bearing), left, math.radians(rng.uniform(-50.0, 50.0))
 
 
-def between(follower, leader):
-    """The leader's state as `marker_projection` has it, from both robots' poses in the world."""
+def between(follower: Pose, leader: Pose) -> npt.NDArray[np.float64]:
+    """The leader's state (6,) as `marker_projection` has it, from both robots' poses in the world."""
     rotation = follower.matrix().T @ leader.matrix()
     place = follower.matrix().T @ (np.array(leader.position) - np.array(follower.position))
     yaw = math.atan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])
@@ -62,13 +71,14 @@ def between(follower, leader):
     return np.array((x, y, yaw, *curvatures))
 
 
-def look(made, start, seed):
+def look(made: Equipment, start: Start, seed: int) -> Look | None:
     """One look: the true state and the mean boxes, or None where the robots overlap."""
     try:
         world = World(made.surface, poses(made.surface, start), made.world, seed=seed)
     except WorldError:
         return None
-    detector, frames = BlockDetector(made.detector.load(), made.detector), []
+    detector = BlockDetector(made.detector.load(), made.detector)
+    frames: list[Sequence[Block]] = []
     try:
         world.request_frames(FOLLOWER, made.fine_tuner.look.frames)
         while events := world.advance():
@@ -82,9 +92,10 @@ def look(made, start, seed):
     return state, mean_boxes([one_marker(blocks, lambda block: -block.width * block.height) for blocks in last])
 
 
-def looks(place, count, seed):
+def looks(place: Callable[[np.random.Generator], Place], count: int, seed: int) -> list[Look]:
     """Looks from random places."""
-    rng, made, found = np.random.default_rng(seed), equipment("precise"), []
+    rng, made = np.random.default_rng(seed), equipment("precise")
+    found: list[Look | None] = []
     for number in range(count):
         ahead, left, yaw = place(rng)
         c, s = math.cos(yaw), math.sin(yaw)
@@ -93,9 +104,10 @@ def looks(place, count, seed):
     return [entry for entry in found if entry is not None]
 
 
-def errors(found):
+def errors(found: Sequence[Look]) -> tuple[dict[str, list[float]], dict[Face, list[tuple[float, bool]]]]:
     """Reported minus true edges [px], by a description of the edge; and widths of faces with whether they are seen."""
-    edges, shown = defaultdict(list), defaultdict(list)
+    edges: defaultdict[str, list[float]] = defaultdict(list)
+    shown: defaultdict[Face, list[tuple[float, bool]]] = defaultdict(list)
     for state, boxes in found:
         columns, widths = MODEL.pixels(state[None])[0, :, 0], MODEL.widths(state)
         if Face.TARGET not in boxes or columns.min() < 3.0 or columns.max() > WIDTH - 4.0:
@@ -119,11 +131,12 @@ def errors(found):
     return edges, shown
 
 
-def _error(state, boxes, face, side):
-    return getattr(boxes[face], side) - float(MODEL.edges(state[None], [Edge(face, side, 0.0, 1.0)])[0, 0])
+def _error(state: npt.NDArray[np.float64], boxes: Mapping[Face, FaceBox], face: Face, side: str) -> float:
+    reported: float = getattr(boxes[face], side)
+    return reported - float(MODEL.edges(state[None], [Edge(face, side, 0.0, 1.0)])[0, 0])
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--looks", type=int, default=4000, help="of each kind")
     parser.add_argument("--seed", type=int, default=1)

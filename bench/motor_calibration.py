@@ -12,6 +12,7 @@ import sys
 
 import numpy as np
 
+from robot_formation.calibration.motor_fit import AxisFit
 from robot_formation.calibration.motor_moves import calibrate_robot
 from robot_formation.calibration.rig import CalibrationRig, RobotOnRig
 from robot_formation.drive.curves import calibrated
@@ -29,7 +30,7 @@ TESTED = (("leader", "v"), ("follower_1", "v"), ("follower_1", "u"))
 TARGETS = {"v": Motion(x_m=STEP_M), "u": Motion.from_uv(STEP_M, 0.0)}
 
 
-def drives(fits, defaults):
+def drives(fits: dict[str, AxisFit], defaults: DriveParameters) -> dict[str, DriveParameters]:
     """The drive's parameters by kind of calibration."""
     own = CalibrationParameters(**{axis: fit.curve for axis, fit in fits.items()})
     ideal = (0.0, 1.0 / defaults.wheel_radius_m)
@@ -37,13 +38,13 @@ def drives(fits, defaults):
     return {kind: DriveParameters(calibration=curves) for kind, curves in kinds.items()}
 
 
-def repeated(robot, parameters, axis, commands):
+def repeated(robot: RobotOnRig, parameters: DriveParameters, axis: str, commands: int) -> list[float]:
     """Distances driven, mm."""
     drive = Drive(parameters)
     return [robot.move(drive, TARGETS[axis])[0].distance_m * 1e3 for _ in range(commands)]
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20, help="seeds 0 .. N-1 (default: 20)")
     parser.add_argument("--commands", type=int, default=40, help="5 cm commands per robot and axis (default: 40)")
@@ -57,7 +58,7 @@ def main():
     )
     defaults = calibrated(from_mapping(DriveParameters, node_defaults("drive"), where="drive"), "")
     floor = make_surface("plane", {"size_m": FLOOR_M})
-    driven = {(robot, axis): {} for robot, axis in TESTED}
+    driven: dict[tuple[str, str], dict[str, list[list[float]]]] = {(robot, axis): {} for robot, axis in TESTED}
     for seed in range(options.seeds):
         for name in ("leader", "follower_1"):
             with RobotOnRig(CalibrationRig(floor, world, seed), name) as robot:
@@ -74,9 +75,9 @@ def main():
     print("robot       axis  curves      mean of robots   spread   worst robot   within 1 mm   scatter of a drive")
     worst = 0.0
     for (name, axis), by_kind in driven.items():
-        for kind, distances in by_kind.items():
-            errors = np.mean(distances, axis=1) - STEP_M * 1e3
-            scatter = np.sqrt(np.mean(np.var(distances, axis=1, ddof=1)))
+        for kind, drives_mm in by_kind.items():
+            errors = np.mean(drives_mm, axis=1) - STEP_M * 1e3
+            scatter = np.sqrt(np.mean(np.var(drives_mm, axis=1, ddof=1)))
             within = np.sum(np.abs(errors) <= TOLERANCE_MM)
             extreme = errors[np.argmax(np.abs(errors))]
             worst = max(worst, abs(extreme)) if kind == "fitted" else worst

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.experiment.in_process import run_in_process
@@ -24,7 +25,7 @@ TRACKS = ("one", "one_baseline", "two", "two_baseline")
 CM = 100.0
 
 
-def errors_of(track, seed, calibration):
+def errors_of(track: str, seed: int, calibration: str) -> dict[str, npt.NDArray[np.float64]]:
     """Errors by robot (pictures,) in metres of one run, of which nothing is kept."""
     settings = [
         f"seed={seed}",
@@ -38,7 +39,7 @@ def errors_of(track, seed, calibration):
         return {robot: seen.errors_m for robot, seen in load_run(Path(folder) / "run").overhead.items()}
 
 
-def draw(file):
+def draw(file: Path) -> None:
     """Write the first picture of track two."""
     surface, parameters = make_surface("bowl"), WorldParameters()
     camera = OverheadCamera(surface, parameters, 3)
@@ -46,7 +47,7 @@ def draw(file):
     cv2.imwrite(str(file), camera.frame(robots, 0))
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=5, help="seeds 0 to N - 1 of each track (default 5)")
     parser.add_argument("--picture", type=Path, help="write an overhead picture to this file and do nothing else")

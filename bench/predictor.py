@@ -11,18 +11,24 @@ Run: python bench/predictor.py [--rounds N] [--timesteps N] [--json]
 import argparse
 import json
 import time
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 from odmd import OnlineDMD
 
 from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.koopman.predictors import NAMES, Predictor, PredictorParameters
 from robot_formation.parameters import from_mapping
 
+Array = npt.NDArray[np.float64]
+Timestep = Callable[[Array, Array, Array], None]
+
 WARM_UP = 3
 
 
-def history(timesteps):
+def history(timesteps: int) -> tuple[Array, Array, Array]:
     """Displacements, residuals and commanded displacements as on the paper's track two, each (timesteps, 2)."""
     rng = np.random.default_rng(0)
     t = np.arange(timesteps)
@@ -32,22 +38,23 @@ def history(timesteps):
     return displacements, residuals, displacements + np.array([0.003, -0.002])
 
 
-def of_predictor(name):
+def of_predictor(name: str) -> Timestep:
     """Make the timestep of one of our predictors."""
     predictor = Predictor(from_mapping(PredictorParameters, {**node_defaults("predictor"), "name": name}, where=name))
 
-    def timestep(x, r, c):
+    def timestep(x: Array, r: Array, c: Array) -> None:
         predictor.observe(x, r, c)
         predictor.predict()
 
     return timestep
 
 
-def of_odmd():
+def of_odmd() -> Timestep:
     """Make the timestep of the reference implementation of online DMD."""
-    dmd, pairs = OnlineDMD(2, 1.0), []
+    dmd = OnlineDMD(2, 1.0)
+    pairs: list[Array] = []
 
-    def timestep(x, r, c):
+    def timestep(x: Array, r: Array, c: Array) -> None:
         pairs.append(x)
         if len(pairs) == WARM_UP:
             dmd.initialize(np.array(pairs[:-1]).T, np.array(pairs[1:]).T)
@@ -58,11 +65,11 @@ def of_odmd():
     return timestep
 
 
-def of_lstsq():
+def of_lstsq() -> Timestep:
     """Make the timestep that fits K anew to all pairs."""
-    rows = []
+    rows: list[Array] = []
 
-    def timestep(x, r, c):
+    def timestep(x: Array, r: Array, c: Array) -> None:
         rows.append(x)
         if len(rows) < WARM_UP:
             return
@@ -72,7 +79,7 @@ def of_lstsq():
     return timestep
 
 
-def microseconds(make, data):
+def microseconds(make: Callable[[], Timestep], data: tuple[Array, Array, Array]) -> float:
     """Time one pass over the history after its first timesteps, per timestep."""
     timestep = make()
     rows = list(zip(*data, strict=True))
@@ -84,15 +91,19 @@ def microseconds(make, data):
     return 1e6 * (time.perf_counter() - began) / (len(rows) - WARM_UP)
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=50)
     parser.add_argument("--timesteps", type=int, default=100)
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     data = history(args.timesteps)
-    makers = {"odmd": of_odmd, "lstsq": of_lstsq, **{name: lambda name=name: of_predictor(name) for name in NAMES}}
-    times = {name: [] for name in makers}
+    makers: dict[str, Callable[[], Timestep]] = {
+        "odmd": of_odmd,
+        "lstsq": of_lstsq,
+        **{name: partial(of_predictor, name) for name in NAMES},
+    }
+    times: dict[str, list[float]] = {name: [] for name in makers}
     for _ in range(args.rounds):
         for name, make in makers.items():
             times[name].append(microseconds(make, data))

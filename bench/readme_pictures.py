@@ -8,9 +8,12 @@ import math
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
+from matplotlib.axes._axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle, Wedge
@@ -25,6 +28,7 @@ from robot_formation.launching.processes import run_metadata
 from robot_formation.parameters import from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
+from robot_formation.surface.bowl import Bowl
 from robot_formation.vision.aruco_detector import TagDetector
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
@@ -40,11 +44,17 @@ HEIGHTS_MM = (60, 80, 100, 120, 140, 160, 180)
 WORLD = WorldParameters()
 LEADER_COLOUR, FOLLOWER_COLOUR = "#E69F00", "#0072B2"
 FACES = {"Target": "#D62718", "Front": "#2E9E3B", "Rear": "#2B4FD0"}
-ARROW = {"width": 0.0, "head_width": 0.016, "head_length": 0.022, "length_includes_head": True, "zorder": 5}
-BACKED = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+ARROW: dict[str, Any] = {
+    "width": 0.0,
+    "head_width": 0.016,
+    "head_length": 0.022,
+    "length_includes_head": True,
+    "zorder": 5,
+}
+BACKED: dict[str, Any] = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
 
 
-def draw_run(folder):
+def draw_run(folder: Path) -> None:
     """Run track two and draw its trajectory and corrections."""
     scenario = with_value(load_track("two"), "seed", SEED)
     with tempfile.TemporaryDirectory() as temporary:
@@ -56,14 +66,15 @@ def draw_run(folder):
     draw_corrections(record, analysis, folder / "corrections.png")
 
 
-def corners(x, y, heading, length, width):
+def corners(x: float, y: float, heading: float, length: float, width: float) -> npt.NDArray[np.float64]:
     """Corners (4, 2) of a rectangle about (x, y) whose length lies along the heading."""
     half = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) * (length / 2, width / 2)
     c, s = math.cos(heading), math.sin(heading)
-    return half @ np.array([(c, s), (-s, c)]) + (x, y)
+    found: npt.NDArray[np.float64] = half @ np.array([(c, s), (-s, c)]) + (x, y)
+    return found
 
 
-def draw_frames(folder):
+def draw_frames(folder: Path) -> None:
     """Draw the plate's axes beside a formation from above: axes, marker faces, camera, distances."""
     figure = Figure(figsize=(11.0, 5.6), layout="constrained")
     FigureCanvasAgg(figure)
@@ -73,8 +84,8 @@ def draw_frames(folder):
     figure.savefig(folder / "frames.png", dpi=130)
 
 
-def _draw_plate(axes):
-    surface = make_surface("bowl")
+def _draw_plate(axes: Axes) -> None:
+    surface = Bowl()
     size = surface.size_m
     ticks = np.linspace(0.0, size, 90)
     xs, ys = np.meshgrid(ticks, ticks)
@@ -90,21 +101,23 @@ def _draw_plate(axes):
         yaw = math.radians(heading)
         right = np.array([math.sin(yaw), -math.cos(yaw)]) * FORMATION_DISTANCE_M
         for place, colour in ((np.array(track), LEADER_COLOUR), (np.array(track) + right, FOLLOWER_COLOUR)):
-            outline = corners(*place, yaw, WORLD.chassis.length_m, WORLD.chassis.width_m)
+            outline = corners(float(place[0]), float(place[1]), yaw, WORLD.chassis.length_m, WORLD.chassis.width_m)
             axes.add_patch(Polygon(outline, facecolor=colour, edgecolor="black", alpha=0.55, zorder=3))
             step = np.array([math.cos(yaw), math.sin(yaw)]) * 0.3
             axes.arrow(*place, *step, color="black", width=0.003, head_width=0.04, zorder=5)
-        axes.text(*(np.array(track) + 0.5 * right + 1.5 * step), label, ha="center", bbox=BACKED, zorder=6)
+        x, y = np.array(track) + 0.5 * right + 1.5 * step
+        axes.text(x, y, label, ha="center", bbox=BACKED, zorder=6)
     for direction, name in (((1, 0), "x"), ((0, 1), "y")):
         axes.arrow(0, 0, *(np.array(direction) * 0.42), color="black", width=0.006, head_width=0.05, zorder=6)
-        axes.text(*(np.array(direction) * 0.50 + 0.05), name, fontsize=12, fontweight="bold", bbox=BACKED, zorder=7)
+        x, y = np.array(direction) * 0.50 + 0.05
+        axes.text(x, y, name, fontsize=12, fontweight="bold", bbox=BACKED, zorder=7)
     axes.plot(0, 0, "ko", markersize=6, clip_on=False, zorder=6)
     axes.set(xlim=(-0.06, size + 0.16), ylim=(-0.12, size + 0.06), aspect="equal", xlabel="x (m)", ylabel="y (m)")
     axes.set_title("world: the plate's corner, metres", fontsize=11)
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _draw_formation(axes):
+def _draw_formation(axes: Axes) -> None:
     """The formation seen from above, driving up the page: right of the page is -y of both robots."""
     gap = FORMATION_DISTANCE_M
     for x, colour, name in ((0.0, LEADER_COLOUR, "leader"), (gap, FOLLOWER_COLOUR, "follower_1")):
@@ -128,12 +141,12 @@ def _draw_formation(axes):
     axes.set_title("formation from above, driving up the page", fontsize=11)
 
 
-def _draw_robot(axes, x, colour, name):
+def _draw_robot(axes: Axes, x: float, colour: str, name: str) -> None:
     outline = corners(x, 0.0, math.pi / 2, WORLD.chassis.length_m, WORLD.chassis.width_m)
     axes.add_patch(Polygon(outline, facecolor=colour, edgecolor="black", alpha=0.30, zorder=2))
     half = WORLD.marker.edge_m / 2
     axes.add_patch(Rectangle((x - half, -half), 2 * half, 2 * half, facecolor="0.2", zorder=3))
-    style = {"linewidth": 5, "solid_capstyle": "butt", "zorder": 6}
+    style: dict[str, Any] = {"linewidth": 5, "solid_capstyle": "butt", "zorder": 6}
     axes.plot([x + half, x + half], [-half, half], color=FACES["Target"], **style)
     axes.plot([x - half, x + half], [half, half], color=FACES["Front"], **style)
     axes.plot([x - half, x + half], [-half, -half], color=FACES["Rear"], **style)
@@ -141,7 +154,7 @@ def _draw_robot(axes, x, colour, name):
     axes.text(x - 0.105, -0.165, name, ha="left", fontsize=10, fontweight="bold", zorder=7)
 
 
-def _axes_of_motion(axes, gap):
+def _axes_of_motion(axes: Axes, gap: float) -> None:
     axes.arrow(gap, 0.0, 0.0, 0.30, color="black", **{**ARROW, "width": 0.003})
     axes.text(gap + 0.012, 0.27, "v = +x\n(forward)", fontsize=10, va="center", zorder=8)
     axes.arrow(gap, 0.0, 0.24, 0.0, color="black", **{**ARROW, "width": 0.003})
@@ -155,14 +168,14 @@ def _axes_of_motion(axes, gap):
                 title_fontsize=9, handlelength=1.2)  # fmt: skip
 
 
-def _dimension(axes, left, right, y, text):
+def _dimension(axes: Axes, left: float, right: float, y: float, text: str) -> None:
     axes.annotate(
         "", (left, y), (right, y), arrowprops={"arrowstyle": "<->", "color": "0.2", "shrinkA": 0, "shrinkB": 0}
     )
     axes.text((left + right) / 2, y - 0.008, text, ha="center", va="top", fontsize=9, zorder=8)
 
 
-def draw_view(folder):
+def draw_view(folder: Path) -> None:
     """Draw what a follower's camera sees in formation and 12 cm ahead of it, with its blocks."""
     parameters = from_mapping(
         DetectorParameters, {"signature_range": [5.0, 6.0, 6.0], "max_merge_dist": 4}, where="bench"
@@ -171,13 +184,18 @@ def draw_view(folder):
     _draw_blocks(folder / "camera.jpg", WORLD, detector, ((0.0, 0.0, 0.0), (0.12, 0.0, 0.0)))
 
 
-def draw_tags(folder):
+def draw_tags(folder: Path) -> None:
     """Draw the marker of tags in formation, and from behind and aside with the leader turned."""
     world = from_mapping(WorldParameters, {"marker": {"kind": "tags"}}, where="bench")
     _draw_blocks(folder / "tags.jpg", world, TagDetector(), ((0.0, 0.0, 0.0), (-0.08, 0.06, math.radians(35.0))))
 
 
-def _draw_blocks(path, world, detector, views):
+def _draw_blocks(
+    path: Path,
+    world: WorldParameters,
+    detector: BlockDetector | TagDetector,
+    views: tuple[tuple[float, float, float], tuple[float, float, float]],
+) -> None:
     """Draw views of the neighbour (follower ahead and farther away in m, neighbour's turn), enlarged twice."""
     plane = make_surface("plane")
     pictures = []
@@ -202,7 +220,7 @@ def _draw_blocks(path, world, detector, views):
     cv2.imwrite(str(path), cv2.cvtColor(both, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 90])
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=PICTURES, help="folder (default: docs/pictures)")
     folder = parser.parse_args().out

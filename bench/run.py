@@ -13,7 +13,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.experiment import scenario as scenarios
@@ -33,11 +35,11 @@ sys.exit(result.exit_code)
 """
 
 
-def size_mb(bag):
+def size_mb(bag: Path) -> float:
     return sum(path.stat().st_size for path in bag.iterdir()) / 1e6
 
 
-def through_the_graph(settings, folder):
+def through_the_graph(settings: Sequence[str], folder: Path) -> dict[str, Any]:
     scenario = scenarios.override(scenarios.load_track("two"), settings)
     bag = folder / "bag"
     began = time.monotonic()
@@ -59,7 +61,7 @@ def through_the_graph(settings, folder):
     }
 
 
-def in_process(settings, folder):
+def in_process(settings: Sequence[str], folder: Path) -> dict[str, Any]:
     bag = folder / "bag"
     began = time.monotonic()
     completed = subprocess.run(
@@ -78,14 +80,14 @@ def in_process(settings, folder):
     }
 
 
-def median_of(rounds):
-    found = {name: statistics.median(r[name] for r in rounds) for name in rounds[0] if name != "share"}
+def median_of(rounds: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {name: statistics.median(r[name] for r in rounds) for name in rounds[0] if name != "share"}
     if "share" in rounds[0]:
         found["share"] = {n: statistics.median(r["share"][n] for r in rounds) for n in rounds[0]["share"]}
     return found
 
 
-def add_real_time_factor(found):
+def add_real_time_factor(found: Mapping[tuple[str, str], Sequence[dict[str, Any]]]) -> None:
     """From start to end less the fastest start of all rounds.
 
     The first sign of life reaches the launcher late if discovery is slow, so a round's own start would flatter it.
@@ -97,9 +99,9 @@ def add_real_time_factor(found):
         r["real_time_factor"] = r["simulated_s"] / r["driving_s"]
 
 
-def measure(rounds, predictor):
+def measure(rounds: int, predictor: str) -> dict[str, dict[str, Any]]:
     ways = {(way.__name__, mode): way for way in (through_the_graph, in_process) for mode in AIMS}
-    found = {key: [] for key in ways}
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {key: [] for key in ways}
     for _ in range(rounds):
         for (name, mode), way in ways.items():
             settings = [f"world.camera.mode={mode}", f"predictor.name={predictor}"]
@@ -109,7 +111,7 @@ def measure(rounds, predictor):
     return {f"{name} {mode}": median_of(values) for (name, mode), values in found.items()}
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--predictor", default="formation", help="of all runs (default: formation)")
@@ -119,7 +121,15 @@ def main():
     if args.json:
         print(json.dumps(found, indent=2))
         return
-    columns = ("wall_s", "startup_s", "driving_s", "stopping_s", "simulated_s", "real_time_factor", "processor_s")
+    columns: tuple[str, ...] = (
+        "wall_s",
+        "startup_s",
+        "driving_s",
+        "stopping_s",
+        "simulated_s",
+        "real_time_factor",
+        "processor_s",
+    )
     columns += ("peak_memory_mb", "bag_mb")
     print(f"{'':28}" + "".join(f"{name:>18}" for name in columns))
     for name, values in found.items():

@@ -22,8 +22,11 @@ import math
 import statistics
 import sys
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.sweep_summary import median_with_interval
@@ -38,12 +41,15 @@ from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
 from robot_formation.vision.aruco_detector import TagDetector
 from robot_formation.vision.marker import Face
+from robot_formation.vision.pixy2.boxes import Box
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import pose_on_surface
+from robot_formation.world.pose import Pose, pose_on_surface
 from robot_formation.world.sensor import Sensor
 from robot_formation.world.tag_faces import FACES
+
+Array = npt.NDArray[np.float64]
 
 KINDS = ("colours", "tags")
 PLANE = make_surface("plane")
@@ -53,7 +59,7 @@ TURNED = math.sin(math.radians(10.0))
 CUT, OBLIQUE = "cut off by the picture's edge", "oblique (narrower than 0.35 of its height)"
 SIZES = ((40.0, "40 px high and more"), (25.0, "25 to 40 px high"), (0.0, "less than 25 px high"))
 GROUPS = [*(name for _, name in SIZES), OBLIQUE, CUT]
-LIGHTS = {
+LIGHTS: dict[str, dict[str, Any]] = {
     "500 lx, white": {},
     "20 lx": {"illuminance_lux": 20.0},
     "5000 lx": {"illuminance_lux": 5000.0},
@@ -69,7 +75,7 @@ LIGHTS = {
 class Eye:
     """A camera before a marker of one kind, with its sensor."""
 
-    def __init__(self, kind, **camera):
+    def __init__(self, kind: str, **camera: Any) -> None:
         values = {"marker": {"kind": kind}, "camera": camera}
         self.world = from_mapping(WorldParameters, values, where="bench")
         self.camera = Camera(PLANE, self.world)
@@ -79,14 +85,16 @@ class Eye:
             TagDetector(parameters.tags, parameters) if tags else BlockDetector(parameters.load(), parameters)
         )
 
-    def picture(self, ahead_m, aside_m, yaw_rad, seed):
+    def picture(
+        self, ahead_m: float, aside_m: float, yaw_rad: float, seed: int
+    ) -> tuple[npt.NDArray[np.uint8], Pose, Pose]:
         """A picture of a neighbour so far ahead and to the left, turned so far, and the poses of both robots."""
         looking = pose_on_surface(PLANE, 0.89, 0.5, 0.0)
         seen = pose_on_surface(PLANE, 0.89 + ahead_m, 0.5 + aside_m, yaw_rad)
         sensor = Sensor(self.world.camera, seed, "bench")
         return sensor.expose(sensor.develop(self.camera.light(looking, [seen])), 0.0), looking, seen
 
-    def outlines(self, looking, seen):
+    def outlines(self, looking: Pose, seen: Pose) -> dict[Face, Array]:
         """Columns and rows (4, 2) of the faces that are turned to the camera."""
         found = {}
         _, lens = self.camera.optical_frame(looking)
@@ -102,7 +110,7 @@ class Eye:
         return found
 
 
-def views():
+def views() -> Iterator[tuple[float, float, float]]:
     """Poses of the neighbour around the follower: ahead and aside in metres, turn in radians."""
     steps = np.arange(-0.45, 0.451, 0.075)
     for ahead, beyond, degrees in itertools.product(steps, steps, range(-60, 61, 15)):
@@ -111,7 +119,7 @@ def views():
             yield float(ahead), float(aside), math.radians(degrees)
 
 
-def sight(corners):
+def sight(corners: Array) -> str:
     """Whether a face is whole in the picture, cut by its edge, or beyond it."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     if (low >= 0.0).all() and high[0] <= 315.0 and high[1] <= 207.0:
@@ -119,7 +127,7 @@ def sight(corners):
     return "cut" if high[0] > 4.0 and low[0] < 311.0 and high[1] > 4.0 and low[1] < 203.0 else "beyond"
 
 
-def group(corners):
+def group(corners: Array) -> str:
     """Name what makes a face easy or hard to see."""
     if sight(corners) == "cut":
         return CUT
@@ -130,7 +138,7 @@ def group(corners):
     return next(name for bound, name in SIZES if height >= bound)
 
 
-def look(detector, picture):
+def look(detector: BlockDetector | TagDetector, picture: npt.NDArray[np.uint8]) -> tuple[dict[int, Box], float]:
     """Boxes by signature, and the fastest of three detections in milliseconds."""
     times = []
     for _ in range(3):
@@ -140,19 +148,21 @@ def look(detector, picture):
     return {box.signature: box for box in boxes}, min(times)
 
 
-def edges(box, corners):
+def edges(box: Box, corners: Array) -> Array:
     """Reported minus true left, right, top, bottom."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     reported = (box.x - box.width / 2, box.x + box.width / 2, box.y - box.height / 2, box.y + box.height / 2)
     return np.subtract(reported, (low[0], high[0], low[1], high[1]))
 
 
-def view():
+def view() -> None:
     """Print what both sensors see of the neighbour from all around it."""
     eyes = {kind: Eye(kind) for kind in KINDS}
-    faces, found = collections.Counter(), collections.Counter()
-    errors, times = collections.defaultdict(list), collections.defaultdict(list)
-    any_face = collections.Counter()
+    faces: collections.Counter[tuple[str, str]] = collections.Counter()
+    found: collections.Counter[tuple[str, str]] = collections.Counter()
+    errors: dict[str, list[Array]] = {kind: [] for kind in KINDS}
+    times: dict[str, list[float]] = {kind: [] for kind in KINDS}
+    any_face: collections.Counter[str] = collections.Counter()
     for number, pose in enumerate(views()):
         some = False
         for kind, eye in eyes.items():
@@ -185,11 +195,11 @@ def view():
     print(f"\nms per frame: colours {costs['colours']:.2f}, tags {costs['tags']:.2f}, ratio {ratio:.2f}")
 
 
-def percent(part, whole):
+def percent(part: int, whole: int) -> str:
     return f"{100.0 * part / whole:.0f} %" if whole else "-"
 
 
-def light():
+def light() -> None:
     """Print how often the Target face in formation is found under other lights."""
     print("\n| light | colours | tags |\n|---|---|---|")
     count = 50
@@ -203,10 +213,10 @@ def light():
         print(f"| {name} | " + " | ".join(shares) + " |")
 
 
-def cost():
+def cost() -> dict[str, float]:
     """Milliseconds of detection in pictures taken about the formation position, both sensors in turn."""
     eyes = {kind: Eye(kind) for kind in KINDS}
-    times = collections.defaultdict(list)
+    times: dict[str, list[float]] = {kind: [] for kind in KINDS}
     for number in range(60):
         for kind, eye in eyes.items():
             picture = eye.picture(0.001 * (number - 30), 0.32 + 0.0005 * (number - 30), 0.0, number)[0]
@@ -214,14 +224,18 @@ def cost():
     return {kind: statistics.median(found) for kind, found in times.items()}
 
 
-def one_run(track, mode, kind, predictor, seed):
+Result = tuple[str, Mapping[str, Any]]
+"""Outcome and totals of a run."""
+
+
+def one_run(track: str, mode: str, kind: str, predictor: str, seed: int) -> Result:
     """Run a scenario; its analysis, or what is left of it."""
     settings = [*CONDITIONS, f"marker={kind}", f"fine_tuner.mode={mode}", f"predictor.name={predictor}", f"seed={seed}"]
     analysis = analyse(run_in_memory(scenarios.override(scenarios.load_track(track), settings)))
     return analysis.outcome, analysis.followers[0].totals
 
 
-def runs(chosen, predictor, jobs):
+def runs(chosen: Sequence[int], predictor: str, jobs: int) -> None:
     """Print whole runs with both sensors."""
     cases = list(itertools.product(("one", "two"), ("paper", "precise"), KINDS))
     results = list(run_parallel(one_run, ((*case, predictor, seed) for case in cases for seed in chosen), jobs))
@@ -229,7 +243,9 @@ def runs(chosen, predictor, jobs):
     print("| track | mode | marker | not finished | formation error (cm) | tags against colours | ", end="")
     print("heading error (deg) | correction (cm) | moves per timestep | out of view (found again) | ms per frame |")
     print("|" + "---|" * 11)
-    stories, before, costs_ms = [], [], cost()
+    stories: list[str] = []
+    before: Sequence[Result] = []
+    costs_ms = cost()
     for number, (track, mode, kind) in enumerate(cases):
         mine = results[number * len(chosen) : (number + 1) * len(chosen)]
         lost = sum(outcome != "done" for outcome, _ in mine)
@@ -253,7 +269,7 @@ def runs(chosen, predictor, jobs):
     print("\n" + "\n".join(stories or ["never out of view"]))
 
 
-def ratios(results, others):
+def ratios(results: Sequence[Result], others: Sequence[Result]) -> str:
     """Median over seeds of the formation error against that of the other sensor's run of the same seed."""
     values = [
         math.inf if a[0] != "done" else a[1]["formation_error_rmse_m"] / b[1]["formation_error_rmse_m"]
@@ -263,24 +279,24 @@ def ratios(results, others):
     return interval(median_with_interval(values), 1.0)
 
 
-def median_of(results, name, scale):
+def median_of(results: Sequence[Result], name: str, scale: float) -> str:
     values = [math.inf if outcome != "done" else totals[name] for outcome, totals in results]
     return interval(median_with_interval([value for value in values if value is not None]), scale)
 
 
-def interval(found, scale):
+def interval(found: Mapping[str, float | None] | None, scale: float) -> str:
     if found is None:
         return "-"
     names = ("median", "low", "high")
-    middle, low, high = ("lost" if found[k] is None else f"{scale * found[k]:.2f}" for k in names)
+    middle, low, high = ("lost" if (value := found[k]) is None else f"{scale * value:.2f}" for k in names)
     return f"{middle} ({low}..{high})"
 
 
-def calibration():
+def calibration() -> None:
     """Print the paper mode's calibration for tags, fitted at the formation's distance and along u."""
     eye = Eye("tags")
 
-    def target(ahead_m, aside_m, seed):
+    def target(ahead_m: float, aside_m: float, seed: int) -> Box:
         return next(
             box for box in eye.detector.detect(eye.picture(ahead_m, aside_m, 0.0, seed)[0]) if box.signature == 1
         )
@@ -296,14 +312,14 @@ def calibration():
     print(f"\ntarget_x_px {middle:.1f}, slope_px_per_m {slope:.0f}, side_px_m {side_px_m:.2f}, side_bias_px {bias:.2f}")
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", default=["view", "light", "runs", "calibration"], help="default: all")
     parser.add_argument("--seeds", default="0:20", help="seeds of the runs (default: 0:20)")
     parser.add_argument("--predictor", default="formation", help="predictor of the runs (default: formation)")
     parser.add_argument("--jobs", type=int, default=1, help="runs at the same time (default: 1)")
     args = parser.parse_args()
-    parts = {
+    parts: dict[str, Callable[[], None]] = {
         "view": view,
         "light": light,
         "runs": lambda: runs(seeds(args.seeds), args.predictor, args.jobs),

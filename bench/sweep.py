@@ -12,6 +12,8 @@ import argparse
 import json
 import statistics
 import time
+from collections.abc import Iterable
+from typing import Any
 
 from robot_formation.experiment import sweep
 
@@ -19,11 +21,11 @@ AIM = 60.0
 JOBS = (1, 2)
 
 
-def plan(seeds):
+def plan(seeds: Iterable[int]) -> sweep.Plan:
     return sweep.Plan(("two",), ("bowl",), ("formation",), tuple(seeds))
 
 
-def runs_per_minute(count, jobs):
+def runs_per_minute(count: int, jobs: int) -> float:
     began = time.perf_counter()
     rows = list(sweep.carry_out(plan(range(count)).tasks(), (), jobs))
     minutes = (time.perf_counter() - began) / 60.0
@@ -33,12 +35,12 @@ def runs_per_minute(count, jobs):
     return count / minutes
 
 
-def warm_up():
+def warm_up() -> None:
     for jobs in JOBS:
         list(sweep.carry_out(plan(range(2 * jobs)).tasks(), ("leader.timesteps=1",), jobs))
 
 
-def measure(count, rounds):
+def measure(count: int, rounds: int) -> dict[str, Any]:
     warm_up()
     found = [{jobs: runs_per_minute(count, jobs) for jobs in JOBS} for _ in range(rounds)]
     return {
@@ -49,7 +51,7 @@ def measure(count, rounds):
     }
 
 
-def main():
+def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=12, help="runs per job count and round")
     parser.add_argument("--rounds", type=int, default=1)

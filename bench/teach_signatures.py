@@ -21,7 +21,7 @@ REGION = (136, 32, 44, 44)
 """Column, row, width and height, px."""
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     default = config_dir() / "signatures.yaml"
     parser.add_argument("--out", type=Path, default=default, help="file to write (default: config/signatures.yaml)")

@@ -16,15 +16,17 @@ import math
 import statistics
 import sys
 import time
+from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
 from robot_formation.parameters import from_mapping
-from robot_formation.surface import make_surface
+from robot_formation.surface import Surface, make_surface
 from robot_formation.world.bullet import pybullet
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import pose_on_surface
+from robot_formation.world.pose import Pose, pose_on_surface
 from robot_formation.world.scene import PEDESTAL_M, Scene
 from robot_formation.world.sensor import Sensor
 from robot_formation.world.start import RobotStart
@@ -38,7 +40,7 @@ DISTANCES_M = (0.32, 0.70)
 class Drivers:
     """Robots that all drive forward and back."""
 
-    def __init__(self, count):
+    def __init__(self, count: int) -> None:
         parameters = from_mapping(WorldParameters, {"camera": {"mode": "on_demand"}}, where="bench")
         starts = [
             RobotStart(f"robot_{n}", 0.25 + DISTANCES_M[0] * (n % 5), 0.4 + 0.6 * (n // 5), 0.5 * math.pi, camera=False)
@@ -47,7 +49,7 @@ class Drivers:
         self.world = World(make_surface("bowl"), starts, parameters, seed=1)
         self._sense = 1.0
 
-    def step_us(self):
+    def step_us(self) -> float:
         """Drive once; microseconds per step."""
         for robot in self.world.robots:
             self.world.command(robot, (self._sense * 4.0,) * 4, (6.0,) * 4)
@@ -61,17 +63,17 @@ class Drivers:
 class Ours:
     """The camera of this package."""
 
-    def __init__(self, surface, parameters, looking, seen):
+    def __init__(self, surface: Surface, parameters: WorldParameters, looking: Pose, seen: Pose) -> None:
         self._camera, self._sensor = Camera(surface, parameters), Sensor(parameters.camera, 1, "bench")
         self._looking, self._seen = looking, seen
         self.full()
 
-    def full(self):
+    def full(self) -> npt.NDArray[np.uint8]:
         """Draw the scene anew, with noise."""
         self._development = self._sensor.develop(self._camera.light(self._looking, [self._seen]))
         return self._sensor.expose(self._development, 0.0)
 
-    def standing(self):
+    def standing(self) -> npt.NDArray[np.uint8]:
         """Give the next frame of the same scene."""
         return self._sensor.expose(self._development, 0.0)
 
@@ -79,7 +81,7 @@ class Ours:
 class Tiny:
     """PyBullet's software renderer on the same scene."""
 
-    def __init__(self, surface, parameters, looking, seen):
+    def __init__(self, surface: Surface, parameters: WorldParameters, looking: Pose, seen: Pose) -> None:
         self._client = pybullet.connect(pybullet.DIRECT)
         scene = Scene(surface, parameters)
         a, b, c, d = scene.patch_corners.T
@@ -105,7 +107,9 @@ class Tiny:
         self._lens = pybullet.computeProjectionMatrixFOV(field, camera.width_px / camera.height_px, camera.near_m, 5.0)
         self._size = (camera.width_px, camera.height_px)
 
-    def _box(self, robot, size, bottom, top, colour):
+    def _box(
+        self, robot: Pose, size: tuple[float, float], bottom: float, top: float, colour: tuple[float, float, float]
+    ) -> None:
         shape = pybullet.createVisualShape(
             pybullet.GEOM_BOX,
             halfExtents=[0.5 * size[0], 0.5 * size[1], 0.5 * (top - bottom)],
@@ -115,7 +119,7 @@ class Tiny:
         middle = robot.place((0.0, 0.0, 0.5 * (bottom + top)))
         pybullet.createMultiBody(0, -1, shape, middle, robot.orientation, physicsClientId=self._client)
 
-    def full(self):
+    def full(self) -> npt.NDArray[np.uint8]:
         """Draw the scene."""
         pixels = pybullet.getCameraImage(
             *self._size,
@@ -129,7 +133,7 @@ class Tiny:
         return np.reshape(pixels, (self._size[1], self._size[0], 4))[..., :3]
 
 
-def fastest_ms(call):
+def fastest_ms(call: Callable[[], object]) -> float:
     """Fastest of some calls, milliseconds."""
     best = float("inf")
     for _ in range(CALLS):
@@ -139,7 +143,7 @@ def fastest_ms(call):
     return best / 1e6
 
 
-def main():
+def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15, help="interleaved rounds (default: 15)")
     rounds = max(1, parser.parse_args().rounds)
@@ -148,10 +152,10 @@ def main():
     scenes = {}
     for distance in DISTANCES_M:
         seen = pose_on_surface(surface, 1.3 - distance, 0.4, 0.5 * math.pi)
-        ours, tiny = (kind(surface, parameters, looking, seen) for kind in (Ours, Tiny))
+        ours, tiny = Ours(surface, parameters, looking, seen), Tiny(surface, parameters, looking, seen)
         scenes[distance] = {"TinyRenderer": tiny.full, "full": ours.full, "standing": ours.standing}
     drivers = {count: Drivers(count) for count in ROBOTS}
-    found = collections.defaultdict(list)
+    found: collections.defaultdict[int | tuple[float, str], list[float]] = collections.defaultdict(list)
     for _ in range(rounds):
         for count, driver in drivers.items():
             found[count].append(min(driver.step_us() for _ in range(2)))

@@ -7,14 +7,16 @@ Run: python bench/world_validation.py
 
 import math
 import sys
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from robot_formation.drive.movement_system import Drive, DriveParameters
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
-from robot_formation.surface import SURFACES, make_surface
-from robot_formation.world.events import JointStates
+from robot_formation.surface import SURFACES, Surface, make_surface
+from robot_formation.world.events import BodyState, JointStates
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.start import RobotStart
 from robot_formation.world.world import World
@@ -42,13 +44,13 @@ WATCHED = {
 }
 
 
-def make_world(surface, x, y, heading, **values):
+def make_world(surface: Surface, x: float, y: float, heading: float, **values: Any) -> World:
     """One robot without imperfections."""
     parameters = from_mapping(WorldParameters, {**IDEAL, **values}, where="bench")
     return World(surface, [RobotStart("robot", x, y, heading)], parameters, seed=0)
 
 
-def displacement(world, start):
+def displacement(world: World, start: BodyState) -> tuple[float, float, float]:
     """Forward, left and turn since a state, in its frame."""
     now = world.ground_truth("robot")
     c, s = math.cos(start.yaw_rad), math.sin(start.yaw_rad)
@@ -56,7 +58,7 @@ def displacement(world, start):
     return c * x + s * y, c * y - s * x, math.remainder(now.yaw_rad - start.yaw_rad, 2.0 * math.pi)
 
 
-def turn_wheels(world, angles):
+def turn_wheels(world: World, angles: Sequence[float] | tuple[float, float, float, float]) -> JointStates:
     """Turn the wheels; where the encoders say they have come to."""
     world.command("robot", angles, (4.0,) * 4)
     states = []
@@ -65,14 +67,14 @@ def turn_wheels(world, angles):
     return states[-1]
 
 
-def error_percent(found, expected):
+def error_percent(found: tuple[float, float, float], expected: tuple[float, float, float]) -> float:
     """Largest difference as a share of the move's length, turns counted at the wheels."""
     scale = (1.0, 1.0, LEVER_M)
     size = math.hypot(*(value * unit for value, unit in zip(expected, scale, strict=True)))
     return 100 * max(abs(a - b) * unit for a, b, unit in zip(found, expected, scale, strict=True)) / size
 
 
-def kinematics(move, mode, drag):
+def kinematics(move: tuple[float, float, float], mode: str, drag: float) -> float:
     """Error of the body's motion against what the wheels have rolled."""
     values = {"motor.drive_mode": mode, "traction.roller_drag": drag}
     world = make_world(make_surface("plane"), 0.89, 0.89, 0.3, **values)
@@ -84,7 +86,7 @@ def kinematics(move, mode, drag):
     return error_percent(displacement(world, start), rolled)
 
 
-def calibrated(move):
+def calibrated(move: tuple[float, float, float]) -> float:
     """Error of a move by the drive's default calibration, pwm_stop."""
     world, drive = make_world(make_surface("plane"), 0.89, 0.89, 0.3), Drive(DriveParameters())
     start = world.ground_truth("robot")
@@ -95,7 +97,7 @@ def calibrated(move):
     return error_percent(displacement(world, start), move)
 
 
-def drift_mm(surface, x, y, heading, seconds, **values):
+def drift_mm(surface: Surface, x: float, y: float, heading: float, seconds: int, **values: float) -> float:
     """How far a robot without commands moves, millimetres."""
     world = make_world(surface, x, y, heading, **WATCHED, **values)
     start = world.ground_truth("robot")
@@ -105,7 +107,7 @@ def drift_mm(surface, x, y, heading, seconds, **values):
     return 1000 * math.hypot(*displacement(world, start)[:2])
 
 
-def main():
+def main() -> int:
     head = ("pid, no drag", "pid", "pwm_stop, no drag", "pwm_stop", "pwm_stop, calibrated")
     print("error on the plane, % of the move\n" + " " * 15 + "".join(f"{name:>21}" for name in head))
     for name, move in MOVES.items():

@@ -30,7 +30,7 @@ for variable in PROFILES:
 @pytest.fixture
 def lab(tmp_path: Path) -> Iterator[Lab]:
     """A ROS domain of the test's own."""
-    from graph_lab import open_lab
+    from graph_lab import Lab, open_lab
 
-    with open_lab(tmp_path) as made:
+    with open_lab(tmp_path, Lab) as made:
         yield made

@@ -1,14 +1,17 @@
 """docs/explanation/alignment.md against the code: the state machine's diagram and the verdicts."""
 
 import re
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 
 from alignment_helpers import blocks_of, state_of
 from repository import ROOT
 from robot_formation.alignment.mode import Verdict
-from robot_formation.follower.fine_tuning import FineTuner, FineTunerParameters, Phase, RequestFrames, SendMove
+from robot_formation.follower.fine_tuning import Action, FineTuner, FineTunerParameters, Phase, RequestFrames, SendMove
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 
@@ -19,13 +22,13 @@ IN_PLACE = state_of()
 class Watched:
     """A fine-tuner whose transitions are noted as (from, to, event)."""
 
-    def __init__(self, mode):
+    def __init__(self, mode: str) -> None:
         look = {"frames": 1, "stable_frames": 1}
         self.tuner = FineTuner(from_mapping(FineTunerParameters, {"mode": mode, "look": look}, where="test"))
-        self.seen = set()
+        self.seen: set[tuple[str, str, str]] = set()
         self.now_ns = 0
 
-    def event(self, name, actions_of):
+    def event(self, name: str, actions_of: Callable[[], list[Action]]) -> list[Action]:
         before = self.tuner.phase
         self.now_ns += 1
         actions = actions_of()
@@ -34,21 +37,21 @@ class Watched:
             self.seen.add((before.name, after.name, name))
         return actions
 
-    def tick(self, timestep):
+    def tick(self, timestep: int) -> None:
         name = "tick 0" if timestep == 0 else "tick"
         self.event(name, lambda: self.tuner.neighbour_done(timestep))
 
-    def frame(self, state):
+    def frame(self, state: npt.NDArray[np.float64] | None) -> list[Action]:
         blocks = [] if state is None else blocks_of(state)
         return self.event("frames", lambda: self.tuner.frame(blocks, self.now_ns))
 
-    def moved(self, motion):
+    def moved(self, motion: Motion) -> list[Action]:
         return self.event("moved", lambda: self.tuner.moved(motion, self.now_ns))
 
-    def stalled(self):
+    def stalled(self) -> None:
         self.event("stalled", self.tuner.stalled)
 
-    def until_lost(self):
+    def until_lost(self) -> None:
         """Show nothing, and carry out every move as asked."""
         for _ in range(100):
             for action in self.frame(None):
@@ -58,7 +61,7 @@ class Watched:
                 return
         pytest.fail("never lost")
 
-    def timestep(self, number):
+    def timestep(self, number: int) -> None:
         self.tick(number)
         self.moved(Motion(0.05))
         self.frame(IN_PLACE)
@@ -68,7 +71,7 @@ class Watched:
 
 
 @cache
-def observed():
+def observed() -> set[tuple[str, str, str]]:
     seen = set()
     for mode in ("paper", "precise"):
         run = Watched(mode)
@@ -76,7 +79,7 @@ def observed():
         run.frame(None)
         run.frame(IN_PLACE)
         run.timestep(1)
-        run.event("prediction", lambda run=run: run.tuner.prediction(Motion(0.05)))
+        run.event("prediction", partial(run.tuner.prediction, Motion(0.05)))
         run.tick(2)
         run.moved(Motion(0.02))
         run.frame(state_of(x_m=0.03))
@@ -90,15 +93,16 @@ def observed():
     return seen
 
 
-def test_the_diagram_shows_exactly_the_transitions_that_happen():
-    diagram = re.search(r"stateDiagram-v2\n(.*?)```", PAGE, re.DOTALL)[1]
-    drawn = set(re.findall(r"^  (\w+) --> (\w+): (.+)$", diagram, re.MULTILINE))
+def test_the_diagram_shows_exactly_the_transitions_that_happen() -> None:
+    diagram = re.search(r"stateDiagram-v2\n(.*?)```", PAGE, re.DOTALL)
+    assert diagram
+    drawn = set(re.findall(r"^  (\w+) --> (\w+): (.+)$", diagram[1], re.MULTILINE))
     assert drawn == observed()
 
 
-def test_every_phase_is_in_the_diagram():
+def test_every_phase_is_in_the_diagram() -> None:
     assert {name for edge in observed() for name in edge[:2]} == set(Phase.__members__)
 
 
-def test_the_table_has_every_verdict():
+def test_the_table_has_every_verdict() -> None:
     assert set(re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE)) == {verdict.value for verdict in Verdict}

@@ -1,6 +1,7 @@
 """The fine-tuner's camera calibration is what the detector shows of the world's marker on level ground."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from robot_formation.parameters import from_mapping, specs
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
 from robot_formation.vision.marker import Face
+from robot_formation.vision.pixy2.boxes import Box
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.signatures import load_signatures, teach_region
@@ -25,14 +27,14 @@ FACE = np.array([[x, -0.03, z] for x in (-0.03, 0.03) for z in (0.156, 0.216)])
 SIGNATURES = load_signatures(config_dir() / "signatures.yaml")
 
 
-def paper_detector():
+def paper_detector() -> BlockDetector:
     values = {
         name: value for name, value in node_defaults("block_detector").items() if name in specs(DetectorParameters)
     }
     return BlockDetector(SIGNATURES, from_mapping(DetectorParameters, values, where="config/block_detector.yaml"))
 
 
-def looks(count):
+def looks(count: int) -> Iterator[tuple[float, float, Box]]:
     """Depth and true column of the Target face, and the block seen, at places about the formation's."""
     plane, generator = make_surface("plane"), np.random.default_rng(3)
     camera, detector = Camera(plane, WORLD), paper_detector()
@@ -51,7 +53,7 @@ def looks(count):
         yield depth, float(camera.project(looking, corners)[:, 0].mean()), block
 
 
-def test_column_and_side_length_are_calibrated_to_a_third_of_a_pixel():
+def test_column_and_side_length_are_calibrated_to_a_third_of_a_pixel() -> None:
     p = AlignmentParameters()
     found = [
         (block.x - column, p.side_px_m / depth - max(block.width, block.height)) for depth, column, block in looks(60)
@@ -61,7 +63,7 @@ def test_column_and_side_length_are_calibrated_to_a_third_of_a_pixel():
     assert side_bias == pytest.approx(p.side_bias_px, abs=0.3)
 
 
-def test_the_signatures_in_config_are_taught_from_the_worlds_marker():
+def test_the_signatures_in_config_are_taught_from_the_worlds_marker() -> None:
     for sig, face in enumerate(("target", "front", "rear"), 1):
         taught = teach_region(marker_picture(WORLD, face), (136, 32, 44, 44), sig)
         stored = next(signature for signature in SIGNATURES if signature.sig == sig)

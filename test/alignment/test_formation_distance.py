@@ -6,17 +6,16 @@ import pytest
 
 from robot_formation.alignment.paper_mode import AlignmentParameters
 from robot_formation.calibration.alignment_trial import AlignmentTrial, Equipment, Start
-from robot_formation.components.block_detector import BlockDetectorNodeParameters
-from robot_formation.components.world import WorldNodeParameters
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters, WorldNodeParameters
 from robot_formation.drive.movement_system import DriveParameters
-from robot_formation.experiment.scenario import node_defaults
-from robot_formation.follower.fine_tuning import FineTunerParameters
+from robot_formation.experiment.node_defaults import node_defaults
+from robot_formation.follower.fine_tuning import AlignmentModeName, FineTunerParameters
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.parameters import ParameterError, from_mapping
 from robot_formation.surface import make_surface
 
 
-def equipment(mode: str, distance_m: float) -> Equipment:
+def equipment(mode: AlignmentModeName, distance_m: float) -> Equipment:
     """The default robots on level ground."""
     return Equipment(
         make_surface("plane"),
@@ -28,9 +27,11 @@ def equipment(mode: str, distance_m: float) -> Equipment:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["paper", "precise"])
+@pytest.mark.parametrize("mode", list(AlignmentModeName))
 @pytest.mark.parametrize("distance_m", [0.30, 0.35])
-def test_an_alignment_ends_in_formation_at_the_distance_that_is_asked_for(mode: str, distance_m: float) -> None:
+def test_an_alignment_ends_in_formation_at_the_distance_that_is_asked_for(
+    mode: AlignmentModeName, distance_m: float
+) -> None:
     trial = AlignmentTrial(equipment(mode, distance_m), Start(0.33, 0.02, 0.0), seed=4).run()
     assert trial.outcome == "aligned"
     assert not trial.touched
@@ -55,4 +56,6 @@ def test_a_distance_at_which_the_bodies_would_not_keep_clear_is_refused() -> Non
     with pytest.raises(ParameterError, match=r"must be at least 0\.263"):
         FineTunerParameters(formation_distance_m=0.25)
     with pytest.raises(ParameterError, match="between lens and Target face"):
-        FineTunerParameters(mode="paper", formation_distance_m=0.06, alignment=AlignmentParameters(distance_m=0.2))
+        FineTunerParameters(
+            mode=AlignmentModeName.PAPER, formation_distance_m=0.06, alignment=AlignmentParameters(distance_m=0.2)
+        )

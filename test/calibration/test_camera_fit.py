@@ -191,7 +191,7 @@ def test_edge_biases_are_reported_minus_true_where_the_edge_is_what_it_seems() -
     sliver = (reported((Face.TARGET, 152, 206)), {Face.TARGET: face(150.0, 200.0), Face.FRONT: face(200.0, 206.0)})
     oblique = (reported((Face.TARGET, 152, 198)), {Face.TARGET: face(150.0, 200.0, slant=3.0), **hidden})
     cut = (reported((Face.TARGET, 2, 30)), {Face.TARGET: face(-10.0, 30.0), **hidden})
-    behind: tuple[CameraSample, dict[int, NDArray[np.float64]]] = (reported((Face.TARGET, 152, 198)), {})
+    behind: tuple[CameraSample, dict[Face, NDArray[np.float64]]] = (reported((Face.TARGET, 152, 198)), {})
     found = edge_biases([alone] * 3 + [sliver, oblique, cut, behind])
     assert {name: (bias.views, bias.mean_px, bias.scatter_px) for name, bias in found.items()} == {
         "target_left_px": (5, 2.0, 0.0),

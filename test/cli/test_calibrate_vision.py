@@ -28,6 +28,7 @@ from robot_formation.cli.main import main
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.follower.camera_calibration_file import load_vision
+from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
 pytestmark = pytest.mark.slow
@@ -96,8 +97,8 @@ def test_the_true_faces_are_those_of_the_pinhole() -> None:
     faces = true_faces(world, CameraSample(0.3, 0.02, 0.0, True))
     columns = [157.5 + 273.7 * (x - 0.02) / 0.308 for x in (-0.03, 0.03)]
     rows = [103.5 - 273.7 * (z - 0.126) / 0.308 for z in (0.216, 0.156)]
-    assert faces[1] == pytest.approx(np.array([[column, row] for column in columns for row in rows]))
-    ahead = true_faces(world, CameraSample(0.3, 0.05, 0.0, True))[2]
+    assert faces[Face.TARGET] == pytest.approx(np.array([[column, row] for column in columns for row in rows]))
+    ahead = true_faces(world, CameraSample(0.3, 0.05, 0.0, True))[Face.FRONT]
     assert ahead[0, 0] == pytest.approx(157.5 - 273.7 * 0.02 / 0.308)
     assert ahead[2, 0] == pytest.approx(157.5 - 273.7 * 0.02 / 0.368)
     assert 2 not in true_faces(world, CameraSample(-0.02, 0.2, 0.0, True))  # it reaches behind the lens

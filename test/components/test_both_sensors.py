@@ -101,7 +101,7 @@ def test_in_formation_the_target_face_is_a_block_of_50_px_50_px_above_the_centre
 @needs_tags
 @pytest.mark.parametrize(("yaw", "faces"), [(-0.7, {Face.TARGET, Face.FRONT}), (0.7, {Face.TARGET, Face.REAR})])
 def test_signatures_name_the_same_faces_and_boxes_nearly_agree(
-    bench: Bench, wire: Wire, yaw: float, faces: set[int]
+    bench: Bench, wire: Wire, yaw: float, faces: set[Face]
 ) -> None:
     found = bounding_boxes(second_look(wire, bench.picture(0.0, 0.34, yaw)))
     assert set(found) == faces

@@ -3,6 +3,8 @@
 import json
 import math
 import re
+from collections.abc import Callable
+from pathlib import Path
 
 import jsonschema
 import pytest
@@ -13,6 +15,7 @@ from robot_formation.errors import FormationError
 from robot_formation.experiment import node_defaults as module
 from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.experiment.scenario import (
+    Scenario,
     Setup,
     load,
     load_track,
@@ -40,13 +43,13 @@ FIXED = {
 
 
 @pytest.fixture
-def track_two():
+def track_two() -> Scenario:
     return load_track("two")
 
 
 @pytest.fixture
-def write(tmp_path):
-    def to_file(text):
+def write(tmp_path: Path) -> Callable[[str], Path]:
+    def to_file(text: str) -> Path:
         path = tmp_path / "mine.yaml"
         path.write_text(text, encoding="utf-8")
         return path
@@ -54,7 +57,7 @@ def write(tmp_path):
     return to_file
 
 
-def one_line(action, *arguments):
+def one_line(action: Callable[..., object], *arguments: object) -> str:
     """The text of the error that an action ends with; one line of the project's own errors."""
     with pytest.raises(FormationError) as caught:
         action(*arguments)
@@ -66,13 +69,13 @@ def one_line(action, *arguments):
 
 
 @pytest.mark.parametrize("name", sorted(presets()))
-def test_every_preset_loads_and_checks_and_is_called_like_its_file(name):
+def test_every_preset_loads_and_checks_and_is_called_like_its_file(name: str) -> None:
     found = load(presets()[name])
     found.check()
     assert found.setup.name == name
 
 
-def test_tracks_are_the_presets_that_are_called_so():
+def test_tracks_are_the_presets_that_are_called_so() -> None:
     assert set(track_names()) == {"one", "two", "one_baseline", "two_baseline"}
 
 
@@ -85,7 +88,9 @@ def test_tracks_are_the_presets_that_are_called_so():
         ("two_baseline", 1.397, 0.163, 135.0, 20),
     ],
 )
-def test_tracks_start_where_the_papers_do(track, x_m, y_m, heading_deg, timesteps):
+def test_tracks_start_where_the_papers_do(
+    track: str, x_m: float, y_m: float, heading_deg: float, timesteps: int
+) -> None:
     found = load_track(track)
     setup = found.setup
     assert (setup.start_x_m, setup.start_y_m, setup.heading_deg) == (x_m, y_m, heading_deg)
@@ -94,7 +99,7 @@ def test_tracks_start_where_the_papers_do(track, x_m, y_m, heading_deg, timestep
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_config_files_hold_only_what_differs_from_the_code_and_what_the_setup_does_not_fix(kind):
+def test_config_files_hold_only_what_differs_from_the_code_and_what_the_setup_does_not_fix(kind: str) -> None:
     defaults = to_mapping(KINDS[kind].parameter_class()())
     given = node_defaults(kind)
     assert not set(given) & FIXED.get(kind, set())
@@ -102,26 +107,26 @@ def test_config_files_hold_only_what_differs_from_the_code_and_what_the_setup_do
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_config_files_are_ros_parameter_files_for_any_node_name(kind):
-    path = module.config_dir() / f"{kind}.yaml"
+def test_config_files_are_ros_parameter_files_for_any_node_name(kind: str) -> None:
+    path = config_dir() / f"{kind}.yaml"
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert list(content) == ["/**"]
     assert list(content["/**"]) == ["ros__parameters"]
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_config_files_hold_valid_values(kind):
+def test_config_files_hold_valid_values(kind: str) -> None:
     from_mapping(KINDS[kind].parameter_class(), node_defaults(kind), where=kind)
 
 
-def test_the_detector_is_tuned_as_in_the_paper():
+def test_the_detector_is_tuned_as_in_the_paper() -> None:
     found = load_track("two").block_detector
     assert found.signature_range == (5.0, 6.0, 6.0)
     assert (found.block_filtering, found.max_merge_dist, found.min_block_area) == (40, 4, 20)
     assert found.signature_teach_threshold == 5600
 
 
-def test_the_same_length_has_the_same_value_in_every_node(track_two):
+def test_the_same_length_has_the_same_value_in_every_node(track_two: Scenario) -> None:
     world, drive, tuner, predictor = track_two.world, track_two.drive, track_two.fine_tuner, track_two.predictor
     assert drive.wheel_radius_m == world.wheels.radius_m
     assert drive.wheel_lever_m == pytest.approx((world.wheels.wheelbase_m + world.wheels.track_m) / 2)
@@ -138,7 +143,9 @@ def test_the_same_length_has_the_same_value_in_every_node(track_two):
     assert tuner.alignment.distance_m == pytest.approx(lens_to_face)
 
 
-def test_the_schema_of_scenario_files_takes_the_presets_and_refuses_what_load_refuses(write):
+def test_the_schema_of_scenario_files_takes_the_presets_and_refuses_what_load_refuses(
+    write: Callable[[str], Path],
+) -> None:
     schema = json.loads((config_dir() / "scenario.schema.json").read_text(encoding="utf-8"))
     assert schema == scenario_schema()
     validator = jsonschema.Draft202012Validator(schema)
@@ -166,8 +173,8 @@ def test_the_schema_of_scenario_files_takes_the_presets_and_refuses_what_load_re
 @pytest.mark.parametrize("heading_deg", [0.0, 37.0, 90.0, 135.0, -120.0])
 @pytest.mark.parametrize("followers", [1, 2, 9])
 def test_each_follower_starts_32_cm_to_the_right_of_its_neighbour_with_the_same_heading(
-    track_two, followers, heading_deg
-):
+    track_two: Scenario, followers: int, heading_deg: float
+) -> None:
     found = override(track_two, [f"followers={followers}", f"heading_deg={heading_deg}"])
     world = found.world
     assert list(world.robots) == ["leader", *(f"follower_{n}" for n in range(1, followers + 1))] == found.robots
@@ -181,7 +188,7 @@ def test_each_follower_starts_32_cm_to_the_right_of_its_neighbour_with_the_same_
     assert (world.start_x_m[0], world.start_y_m[0]) == (1.412, 0.111)
 
 
-def test_the_leader_waits_for_every_follower_and_each_tick_has_its_listeners(track_two):
+def test_the_leader_waits_for_every_follower_and_each_tick_has_its_listeners(track_two: Scenario) -> None:
     found = override(track_two, ["followers=3"])
     assert found.leader.followers == ("follower_1", "follower_2", "follower_3")
     listeners = {robot: found.of_robot(KINDS["fine_tuner"], robot).done_listeners for robot in found.robots[1:]}
@@ -191,7 +198,7 @@ def test_the_leader_waits_for_every_follower_and_each_tick_has_its_listeners(tra
 # --- files and overrides ----------------------------------------------------------------------------------------------
 
 
-def test_a_file_says_only_what_differs_and_is_called_like_itself(write):
+def test_a_file_says_only_what_differs_and_is_called_like_itself(write: Callable[[str], Path]) -> None:
     found = load(write("seed: 7\npredictor:\n  name: previous\nworld:\n  camera: {mode: on_demand}\n"))
     assert found.setup == Setup(name="mine", seed=7)
     assert found.settings["predictor"] == {"name": "previous"}
@@ -200,7 +207,7 @@ def test_a_file_says_only_what_differs_and_is_called_like_itself(write):
     assert found.world.seed == 7
 
 
-def test_an_override_beats_the_file_which_beats_config_which_beats_the_code(write):
+def test_an_override_beats_the_file_which_beats_config_which_beats_the_code(write: Callable[[str], Path]) -> None:
     path = write("predictor:\n  forgetting: 0.9\n  sigma_u_m: 0.001\n")
     found = override(load(path), ["predictor.forgetting=0.8"]).predictor
     assert (found.forgetting, found.sigma_u_m, found.max_u_m) == (0.8, 0.001, 0.1)
@@ -208,7 +215,7 @@ def test_an_override_beats_the_file_which_beats_config_which_beats_the_code(writ
     assert KINDS["block_detector"].parameter_class()().block_filtering == 3
 
 
-def test_the_last_of_several_overrides_counts_and_the_scenario_itself_is_not_changed(track_two):
+def test_the_last_of_several_overrides_counts_and_the_scenario_itself_is_not_changed(track_two: Scenario) -> None:
     found = override(track_two, ["predictor.forgetting=0.8", "seed=3", "predictor.forgetting=0.7", "seed=4"])
     assert found.predictor.forgetting == 0.7
     assert found.setup.seed == 4
@@ -216,7 +223,7 @@ def test_the_last_of_several_overrides_counts_and_the_scenario_itself_is_not_cha
     assert "forgetting" not in track_two.settings.get("predictor", {})
 
 
-def test_values_of_overrides_are_yaml(track_two):
+def test_values_of_overrides_are_yaml(track_two: Scenario) -> None:
     settings = ["block_detector.signature_range=[1, 2.5]", "world.sleep=false", "name=my run", "drive.max_v_m=0.1"]
     found = override(track_two, settings)
     assert found.block_detector.signature_range == (1.0, 2.5)
@@ -225,21 +232,21 @@ def test_values_of_overrides_are_yaml(track_two):
     assert found.drive.max_v_m == 0.1
 
 
-def test_a_value_may_hold_an_equals_sign(track_two):
+def test_a_value_may_hold_an_equals_sign(track_two: Scenario) -> None:
     found = override(track_two, ["world.surface=plane", "world.surface_parameters=['height_m=0.2']"])
     found.check()
     assert found.world.surface_parameters == ("height_m=0.2",)
 
 
 @pytest.mark.parametrize("surface", sorted(SURFACES))
-def test_another_surface_comes_with_its_own_defaults(track_two, surface):
+def test_another_surface_comes_with_its_own_defaults(track_two: Scenario, surface: str) -> None:
     found = with_surface(override(track_two, ["world.surface_parameters=['height_m=0.2']"]), surface)
     assert found.world.surface == surface
     assert found.world.surface_parameters == ()
     found.check()
 
 
-def test_every_predictor_can_be_chosen(track_two):
+def test_every_predictor_can_be_chosen(track_two: Scenario) -> None:
     for name in NAMES:
         assert override(track_two, [f"predictor.name={name}"]).predictor.name == name
     assert set(specs(PredictorParameters)["name"].choices) == set(NAMES)
@@ -273,22 +280,22 @@ def test_every_predictor_can_be_chosen(track_two):
         ("world.mode=stream", "did you mean 'camera.mode'?"),
     ],
 )
-def test_a_wrong_override_is_answered_in_one_line_that_helps(track_two, setting, text):
+def test_a_wrong_override_is_answered_in_one_line_that_helps(track_two: Scenario, setting: str, text: str) -> None:
     assert text in one_line(override, track_two, [setting])
 
 
-def test_a_misspelt_track_suggests_the_near_one():
+def test_a_misspelt_track_suggests_the_near_one() -> None:
     assert one_line(load_track, "tow").startswith("no track 'tow'; did you mean 'two'?")
     assert "there are: one, one_baseline, two, two_baseline" in one_line(load_track, "xyz")
 
 
-def test_a_misspelt_surface_suggests_the_near_one(track_two):
+def test_a_misspelt_surface_suggests_the_near_one(track_two: Scenario) -> None:
     assert "no surface 'bowll'; did you mean 'bowl'?" in one_line(with_surface, track_two, "bowll")
     wrong = override(track_two, ["world.surface=plain"])
     assert "did you mean 'plane'?" in one_line(wrong.check)
 
 
-def test_wrong_parameters_of_a_surface_are_found_by_the_check(track_two):
+def test_wrong_parameters_of_a_surface_are_found_by_the_check(track_two: Scenario) -> None:
     wrong = override(track_two, ["world.surface=plane", "world.surface_parameters=['heigth_m=0.1']"])
     assert "did you mean 'height_m'?" in one_line(wrong.check)
     wrong = override(track_two, ["world.surface_parameters=['height_m']"])
@@ -314,14 +321,16 @@ def test_wrong_parameters_of_a_surface_are_found_by_the_check(track_two):
         ("name: 3\n", "'name' must be of type str, not 3"),
     ],
 )
-def test_a_wrong_file_is_answered_in_one_line_that_names_it(write, text, words):
+def test_a_wrong_file_is_answered_in_one_line_that_names_it(
+    write: Callable[[str], Path], text: str, words: str
+) -> None:
     path = write(text)
     found = one_line(load, path)
     assert found.startswith(str(path))
     assert words in found
 
 
-def test_a_missing_file_a_folder_and_a_picture_are_no_scenarios(tmp_path):
+def test_a_missing_file_a_folder_and_a_picture_are_no_scenarios(tmp_path: Path) -> None:
     assert "can't be read (No such file" in one_line(load, tmp_path / "missing.yaml")
     assert "can't be read" in one_line(load, tmp_path)
     (tmp_path / "picture.yaml").write_bytes(b"\x89PNG\xff\xfe")
@@ -329,7 +338,9 @@ def test_a_missing_file_a_folder_and_a_picture_are_no_scenarios(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "- 1\n", "drive: {}\n", "'/**': 3\n", "'/**': {ros__parameters: 3}\n"])
-def test_a_config_file_of_another_form_is_answered_with_the_form_it_needs(tmp_path, monkeypatch, text):
+def test_a_config_file_of_another_form_is_answered_with_the_form_it_needs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
     (tmp_path / "drive.yaml").write_text(text, encoding="utf-8")
     monkeypatch.setattr(module, "config_dir", lambda: tmp_path)
     assert re.search("drive.yaml: a ROS parameter file begins with", one_line(node_defaults, "drive"))
@@ -347,13 +358,13 @@ def test_a_config_file_of_another_form_is_answered_with_the_form_it_needs(tmp_pa
         ("world.real_time_factor", -1.0, "--real-time-factor", "--real-time-factor is -1.0, outside 0.0 to 1000.0"),
     ],
 )
-def test_a_wrong_value_of_an_option_names_the_option_alone(key, value, source, message):
+def test_a_wrong_value_of_an_option_names_the_option_alone(key: str, value: object, source: str, message: str) -> None:
     with pytest.raises(FormationError) as raised:
         with_option(load_track("one"), key, value, source)
     assert str(raised.value) == message
 
 
-def test_the_value_of_an_option_may_be_a_text():
+def test_the_value_of_an_option_may_be_a_text() -> None:
     scenario = with_option(load_track("one"), "seed", "7", "seed:=")
     scenario = with_option(scenario, "world.real_time_factor", "2", "real_time_factor:=")
     scenario = with_option(scenario, "world.camera.mode", "on_demand", "camera:=")
@@ -362,6 +373,6 @@ def test_the_value_of_an_option_may_be_a_text():
 
 
 @pytest.mark.parametrize("setting", ["sed=3", "predicter.name=x", "predictor.nam=x", "seed", "seed=[1", "seed=x"])
-def test_a_wrong_setting_names_where_it_was_written(setting):
+def test_a_wrong_setting_names_where_it_was_written(setting: str) -> None:
     with pytest.raises(FormationError, match=r"^set:="):
         override(load_track("one"), [setting], source="set:=")

@@ -1,6 +1,10 @@
 """The follower's timestep cycle as a script of events, and what it does when events are wrong."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import pytest
 
@@ -27,7 +31,7 @@ TOO_FAR_BACK = [Block(Face.TARGET, 200, 60, 49, 49, index=7)]  # the face is to 
 FRAMES = 2
 
 
-def parameters(**values):
+def parameters(**values: Any) -> FineTunerParameters:
     look = {"frames": FRAMES, "stable_frames": 2, "extra_frames": 3, "max_extensions": 2}
     return from_mapping(FineTunerParameters, {"mode": "paper", "look": look, **values}, where="test")
 
@@ -35,32 +39,35 @@ def parameters(**values):
 class Script:
     """A fine-tuner with a clock that counts nanoseconds, as if every event took one."""
 
-    def __init__(self, **values):
+    def __init__(self, **values: Any) -> None:
         self.parameters = parameters(**values)
         self.tuner = FineTuner(self.parameters)
         self.now_ns = 0
 
-    def tick(self, timestep):
+    def phase(self) -> Phase:
+        return self.tuner.phase
+
+    def tick(self, timestep: int) -> list[Any]:
         return self.tuner.neighbour_done(timestep)
 
-    def moved(self, motion):
+    def moved(self, motion: Motion) -> list[Any]:
         self.now_ns += 1
         return self.tuner.moved(motion, self.now_ns)
 
-    def frame(self, blocks):
+    def frame(self, blocks: Sequence[Block]) -> list[Any]:
         self.now_ns += 1
         return self.tuner.frame(blocks, self.now_ns)
 
-    def look(self, blocks):
+    def look(self, blocks: Sequence[Block]) -> list[Any]:
         """Show one whole look; only its last frame may have an answer."""
         for _ in range(FRAMES - 1):
             assert self.frame(blocks) == []
         return self.frame(blocks)
 
-    def prediction(self, motion):
+    def prediction(self, motion: Motion) -> list[Any]:
         return self.tuner.prediction(motion)
 
-    def timestep(self, number, moved, prediction=None):
+    def timestep(self, number: int, moved: Motion, prediction: Motion | None = None) -> list[Any]:
         """One timestep without corrections; the actions of its beginning."""
         begun = self.tick(number)
         self.moved(moved)
@@ -69,7 +76,7 @@ class Script:
         return begun
 
 
-def after_collection(**values):
+def after_collection(**values: Any) -> Script:
     """A fine-tuner that has finished timesteps 0 to 3 and holds the prediction (4, 4) cm for timestep 4."""
     script = Script(**values)
     script.tick(0)
@@ -79,26 +86,28 @@ def after_collection(**values):
     return script
 
 
-def residual_of(blocks, script):
-    return PaperAlignment(script.parameters.alignment).offset(blocks)
+def residual_of(blocks: Sequence[Block], script: Script) -> Motion:
+    offset = PaperAlignment(script.parameters.alignment).offset(blocks)
+    assert offset is not None
+    return offset
 
 
-def test_timestep_0_only_looks_corrects_and_ticks():
+def test_timestep_0_only_looks_corrects_and_ticks() -> None:
     script = Script()
-    assert script.tuner.phase is Phase.NEIGHBOUR
+    assert script.phase() is Phase.NEIGHBOUR
     assert script.tick(0) == [State(AlignmentState.ALIGN), RequestFrames(FRAMES)]
-    assert script.tuner.phase is Phase.LOOK
+    assert script.phase() is Phase.LOOK
     (state, move) = script.look(TOO_FAR_BACK)
     assert state == State(AlignmentState.CORRECT, "fine-tune v")
     assert move.motion.x_m == pytest.approx(41.5 / 836.0)
-    assert script.tuner.phase is Phase.MOVE
+    assert script.phase() is Phase.MOVE
     assert script.moved(Motion(0.05)) == [RequestFrames(FRAMES)]
     assert script.look(IN_PLACE) == [State(AlignmentState.ALIGNED), Done(0)]
-    assert script.tuner.phase is Phase.NEIGHBOUR
+    assert script.phase() is Phase.NEIGHBOUR
     assert script.tuner.timestep == 1
 
 
-def test_the_whole_cycle_from_collection_to_prediction():
+def test_the_whole_cycle_from_collection_to_prediction() -> None:
     script = Script()
     script.tick(0)
     script.look(IN_PLACE)
@@ -137,7 +146,7 @@ def test_the_whole_cycle_from_collection_to_prediction():
     assert script.tick(5) == [State(AlignmentState.PREDICT), SendMove(Motion(0.042, -0.013))]
 
 
-def test_done_is_ticked_only_when_the_prediction_is_in_hand():
+def test_done_is_ticked_only_when_the_prediction_is_in_hand() -> None:
     script = Script()
     script.tick(0)
     script.look(IN_PLACE)
@@ -148,7 +157,7 @@ def test_done_is_ticked_only_when_the_prediction_is_in_hand():
     assert script.prediction(Motion(0.05)) == [Done(1), State(AlignmentState.COLLECT), SendMove(Motion(0.05))]
 
 
-def test_the_displacement_composes_turns_between_moves():
+def test_the_displacement_composes_turns_between_moves() -> None:
     script = Script()
     script.tick(0)
     script.look(IN_PLACE)
@@ -161,7 +170,7 @@ def test_the_displacement_composes_turns_between_moves():
     assert (found.x_m, found.y_m, found.yaw_rad) == pytest.approx((0.05, 0.02, math.pi / 2))
 
 
-def test_each_timestep_starts_its_displacement_and_its_count_of_corrections_anew():
+def test_each_timestep_starts_its_displacement_and_its_count_of_corrections_anew() -> None:
     script = Script(alignment={"max_moves": 1})
     script.tick(0)
     script.look(IN_PLACE)
@@ -175,7 +184,7 @@ def test_each_timestep_starts_its_displacement_and_its_count_of_corrections_anew
         script.prediction(Motion(0.05))
 
 
-def test_unaligned_after_too_many_corrections_is_warned_reported_and_goes_on():
+def test_unaligned_after_too_many_corrections_is_warned_reported_and_goes_on() -> None:
     script = Script(alignment={"max_moves": 1})
     script.tick(0)
     script.look(IN_PLACE)
@@ -190,7 +199,7 @@ def test_unaligned_after_too_many_corrections_is_warned_reported_and_goes_on():
     assert script.prediction(Motion(0.05)) == [Done(1)]
 
 
-def test_without_the_target_face_the_residual_is_unknown():
+def test_without_the_target_face_the_residual_is_unknown() -> None:
     script = Script(alignment={"max_moves": 1})
     only_front = [Block(Face.FRONT, 158, 60, 40, 40)]
     script.tick(0)
@@ -202,7 +211,7 @@ def test_without_the_target_face_the_residual_is_unknown():
     assert script.look(only_front)[-1] == Report(Motion(0.05).then(Motion(-0.05)), None, Motion(0.0))
 
 
-def test_commanded_is_the_displacement_without_what_the_prediction_move_missed():
+def test_commanded_is_the_displacement_without_what_the_prediction_move_missed() -> None:
     script = after_collection()  # with the prediction (4, 4) cm
     script.tick(4)
     script.moved(Motion.from_uv(0.037, 0.043))
@@ -213,7 +222,7 @@ def test_commanded_is_the_displacement_without_what_the_prediction_move_missed()
     assert (report.commanded.u_m, report.commanded.v_m) == pytest.approx((0.041, 0.051))
 
 
-def test_commanded_is_of_the_move_that_was_sent_when_the_prediction_was_cut():
+def test_commanded_is_of_the_move_that_was_sent_when_the_prediction_was_cut() -> None:
     script = after_collection()
     script.timestep(4, Motion(0.05), Motion.from_uv(0.15, 0.05))
     script.tick(5)
@@ -222,7 +231,7 @@ def test_commanded_is_of_the_move_that_was_sent_when_the_prediction_was_cut():
     assert (report.commanded.u_m, report.commanded.v_m) == pytest.approx((0.05, 0.05))
 
 
-def test_commanded_is_known_in_the_collection_phase_and_starts_anew_in_each_timestep():
+def test_commanded_is_known_in_the_collection_phase_and_starts_anew_in_each_timestep() -> None:
     script = Script()
     script.tick(0)
     script.look(IN_PLACE)
@@ -237,7 +246,7 @@ def test_commanded_is_known_in_the_collection_phase_and_starts_anew_in_each_time
         script.prediction(Motion(0.05))
 
 
-def test_commanded_is_unknown_where_the_prediction_moves_end_is_but_not_where_a_corrections_is():
+def test_commanded_is_unknown_where_the_prediction_moves_end_is_but_not_where_a_corrections_is() -> None:
     script = Script()
     script.tick(0)
     script.look(IN_PLACE)
@@ -256,7 +265,7 @@ def test_commanded_is_unknown_where_the_prediction_moves_end_is_but_not_where_a_
     assert report.commanded == Motion(0.01)
 
 
-def test_only_frames_stamped_after_the_last_fact_count():
+def test_only_frames_stamped_after_the_last_fact_count() -> None:
     script = Script()
     script.tick(0)
     script.look(IN_PLACE)
@@ -270,7 +279,7 @@ def test_only_frames_stamped_after_the_last_fact_count():
     assert script.tuner.stamp_ns == 102
 
 
-def test_a_repeated_look_does_not_count_the_frames_of_the_one_before():
+def test_a_repeated_look_does_not_count_the_frames_of_the_one_before() -> None:
     script = Script()
     script.tick(0)
     assert script.look([]) == [State(AlignmentState.HOLD), RequestFrames(FRAMES)]
@@ -279,7 +288,7 @@ def test_a_repeated_look_does_not_count_the_frames_of_the_one_before():
     assert script.look(IN_PLACE) == [State(AlignmentState.REACQUIRED), State(AlignmentState.ALIGNED), Done(0)]
 
 
-def test_a_look_whose_blocks_change_is_extended_until_they_are_stable():
+def test_a_look_whose_blocks_change_is_extended_until_they_are_stable() -> None:
     script = Script()
     script.tick(0)
     assert script.frame([]) == []
@@ -288,7 +297,7 @@ def test_a_look_whose_blocks_change_is_extended_until_they_are_stable():
     assert script.frame(IN_PLACE) == [State(AlignmentState.ALIGNED), Done(0)]
 
 
-def test_extensions_are_bounded_and_then_the_last_frame_decides():
+def test_extensions_are_bounded_and_then_the_last_frame_decides() -> None:
     script = Script()
     script.tick(0)
     flicker = [IN_PLACE, []]
@@ -298,7 +307,7 @@ def test_extensions_are_bounded_and_then_the_last_frame_decides():
     assert answers[-1] == [State(AlignmentState.HOLD), RequestFrames(FRAMES)]  # its last frame was empty
 
 
-def test_another_tracking_index_is_another_block_but_order_and_place_are_not():
+def test_another_tracking_index_is_another_block_but_order_and_place_are_not() -> None:
     for second, stable in (
         ([Block(Face.TARGET, 158, 60, 49, 49, index=8)], False),
         ([Block(Face.TARGET, 160, 61, 48, 50, index=7)], True),
@@ -323,7 +332,7 @@ def test_another_tracking_index_is_another_block_but_order_and_place_are_not():
         (Motion.from_uv(-0.15, 0.5), Motion.from_uv(-0.05, 0.1)),
     ],
 )
-def test_a_prediction_beyond_the_range_is_cut_and_said(wish, cut):
+def test_a_prediction_beyond_the_range_is_cut_and_said(wish: Motion, cut: Motion) -> None:
     script = after_collection()
     script.timestep(4, Motion(0.05), wish)
     warning, state, move = script.tick(5)
@@ -333,31 +342,33 @@ def test_a_prediction_beyond_the_range_is_cut_and_said(wish, cut):
     assert (move.motion.x_m, move.motion.y_m) == (cut.x_m, cut.y_m)
 
 
-def test_a_prediction_at_the_end_of_the_range_is_not_cut():
+def test_a_prediction_at_the_end_of_the_range_is_not_cut() -> None:
     script = after_collection()
     script.timestep(4, Motion(0.05), Motion.from_uv(0.05, 0.1))
     assert script.tick(5) == [State(AlignmentState.PREDICT), SendMove(Motion.from_uv(0.05, 0.1))]
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_a_prediction_that_is_not_finite_becomes_the_previous_displacement(bad):
+def test_a_prediction_that_is_not_finite_becomes_the_previous_displacement(bad: float) -> None:
     script = after_collection()
     script.tick(4)
     script.moved(Motion(0.047, 0.003))
     script.look(IN_PLACE)
     warning, done = script.prediction(Motion(0.05, bad))
+    assert isinstance(warning, Warn)
     assert "finite" in warning.text
     assert done == Done(4)
     assert script.tick(5) == [State(AlignmentState.PREDICT), SendMove(Motion(0.047, 0.003))]
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_a_moved_that_is_not_finite_is_said_left_out_and_its_stamp_still_tells_which_frames_count(bad):
+def test_a_moved_that_is_not_finite_is_said_left_out_and_its_stamp_still_tells_which_frames_count(bad: float) -> None:
     script = Script()
     script.tick(0)
     script.look(IN_PLACE)
     script.tick(1)
     warning, request = script.tuner.moved(Motion(bad, 0.01), 1000)
+    assert isinstance(warning, Warn)
     assert "finite" in warning.text
     assert request == RequestFrames(FRAMES)
     for stamp_ns in (999, 1000):
@@ -367,7 +378,7 @@ def test_a_moved_that_is_not_finite_is_said_left_out_and_its_stamp_still_tells_w
     assert report.displacement == Motion()
 
 
-def in_phase(phase):
+def in_phase(phase: Phase) -> Script:
     """A fine-tuner that waits for the event of a phase."""
     if phase is Phase.LOST:
         script = Script(alignment={"max_empty_looks": 1})
@@ -397,11 +408,11 @@ def in_phase(phase):
     ],
     ids=lambda value: value.name.lower() if isinstance(value, Phase) else "",
 )
-def test_events_that_a_phase_does_not_wait_for_change_nothing(phase, unexpected):
+def test_events_that_a_phase_does_not_wait_for_change_nothing(phase: Phase, unexpected: tuple[str, str, str]) -> None:
     script = in_phase(phase)
     assert script.tuner.phase is phase
     before = script.tuner.phase, script.tuner.timestep, script.tuner.stamp_ns
-    answers = {
+    answers: dict[str, Callable[[], list[Any]]] = {
         "moved": lambda: script.moved(Motion(0.3)),
         "frame": lambda: script.frame(TOO_FAR_BACK),
         "prediction": lambda: script.prediction(Motion(0.3)),
@@ -414,7 +425,7 @@ def test_events_that_a_phase_does_not_wait_for_change_nothing(phase, unexpected)
     assert (script.tuner.phase, script.tuner.timestep, script.tuner.stamp_ns) == before
 
 
-def test_an_old_tick_of_the_neighbour_starts_nothing():
+def test_an_old_tick_of_the_neighbour_starts_nothing() -> None:
     script = Script()
     script.tick(0)
     script.look(IN_PLACE)
@@ -422,7 +433,7 @@ def test_an_old_tick_of_the_neighbour_starts_nothing():
     assert script.tick(1) != []
 
 
-def test_a_leader_that_stays_out_of_view_is_lost_after_the_bound_of_looks():
+def test_a_leader_that_stays_out_of_view_is_lost_after_the_bound_of_looks() -> None:
     script = Script(alignment={"max_empty_looks": 2})
     script.tick(0)
     assert script.look([]) == [State(AlignmentState.HOLD), RequestFrames(FRAMES)]
@@ -430,7 +441,7 @@ def test_a_leader_that_stays_out_of_view_is_lost_after_the_bound_of_looks():
     assert script.tuner.phase is Phase.LOST
 
 
-def test_a_leader_that_comes_back_into_view_is_not_lost():
+def test_a_leader_that_comes_back_into_view_is_not_lost() -> None:
     script = Script(alignment={"max_empty_looks": 2})
     script.tick(0)
     for _ in range(3):

@@ -24,7 +24,7 @@ def overlap_m2(other: Motion) -> float:
 
 
 @given(places, places, angles)
-def test_footprints_overlap_just_where_the_gap_is_negative(x_m, y_m, yaw_rad):
+def test_footprints_overlap_just_where_the_gap_is_negative(x_m: float, y_m: float, yaw_rad: float) -> None:
     other = Motion(x_m, y_m, yaw_rad)
     gap_m = footprint_gap_m(other, LENGTH_M, WIDTH_M)
     if abs(gap_m) > 1e-3:  # nearer to touching, single-precision areas say nothing
@@ -32,12 +32,12 @@ def test_footprints_overlap_just_where_the_gap_is_negative(x_m, y_m, yaw_rad):
 
 
 @given(places, places, angles)
-def test_the_gap_is_the_same_from_both_sides(x_m, y_m, yaw_rad):
+def test_the_gap_is_the_same_from_both_sides(x_m: float, y_m: float, yaw_rad: float) -> None:
     other = Motion(x_m, y_m, yaw_rad)
     back = footprint_gap_m(other.inverse(), LENGTH_M, WIDTH_M)
     assert back == pytest.approx(footprint_gap_m(other, LENGTH_M, WIDTH_M), abs=1e-12)
 
 
-def test_side_by_side_the_gap_is_the_distance_less_a_width():
+def test_side_by_side_the_gap_is_the_distance_less_a_width() -> None:
     assert footprint_gap_m(Motion(0.0, 0.32), LENGTH_M, WIDTH_M) == pytest.approx(0.32 - WIDTH_M)
     assert footprint_gap_m(Motion(0.5, 0.0), LENGTH_M, WIDTH_M) == pytest.approx(0.5 - LENGTH_M)

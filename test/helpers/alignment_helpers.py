@@ -1,12 +1,15 @@
 """Blocks of a neighbour at a known pose: what an ideal camera with the detector's known biases would report."""
 
 import numpy as np
+import numpy.typing as npt
 
 from robot_formation.alignment.precise.marker_edges import EdgeParameters
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, Matrix, Vector
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
+
+Array = npt.NDArray[np.float64]
 
 MODEL = MarkerModel(GeometryParameters())
 EDGES = EdgeParameters()

@@ -1,10 +1,15 @@
 """The command line as a person gets it wrong."""
 
+from pathlib import Path
+
+import pytest
+
 from robot_formation.cli.main import main
 
 
-def complaint(capsys, *arguments):
+def complaint(capsys: pytest.CaptureFixture[str], *arguments: Path | str) -> str:
     """Call a verb that must fail on its arguments; return the one line that it prints."""
+    code: object
     try:
         code = main([str(argument) for argument in arguments])
     except SystemExit as leave:  # argparse ends so

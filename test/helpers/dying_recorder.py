@@ -2,6 +2,8 @@
 
 import resource
 import struct
+from collections.abc import Iterator
+from pathlib import Path
 
 import zstandard
 
@@ -10,7 +12,7 @@ from robot_formation.bag.reader import read_bag
 MAGIC_BYTES, CHUNK, MESSAGE = 8, 0x06, 0x05
 
 
-def records(data):
+def records(data: bytes) -> Iterator[tuple[int, bytes]]:
     """Opcode and body of each whole MCAP record, by the specification."""
     place = 0
     while place + 9 <= len(data):
@@ -21,7 +23,7 @@ def records(data):
         place += 9 + length
 
 
-def ticks_in_finished_chunks(file):
+def ticks_in_finished_chunks(file: Path) -> list[int]:
     found = []
     for opcode, body in records(file.read_bytes()[MAGIC_BYTES:]):
         if opcode == CHUNK:
@@ -31,10 +33,10 @@ def ticks_in_finished_chunks(file):
     return found
 
 
-def ticks_of(bag):
+def ticks_of(bag: Path) -> list[int]:
     with read_bag(bag) as opened:
         return [message.message.data for message in opened.messages(["/tick"])]
 
 
-def limit_file_size():
+def limit_file_size() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.experiment import scenario as scenarios
+from robot_formation.experiment.run_result import RunResult
+from robot_formation.experiment.scenario import Scenario
 from robot_formation.launching.launcher import Launcher
+from robot_formation.launching.processes import Process
 
 SHORT = ("leader.timesteps=4", "world.camera.mode=on_demand")
 
@@ -23,12 +29,12 @@ STRICT = {
 """Python's development mode, and warnings as errors; one about a file left open only is printed."""
 
 
-def short_scenario(*settings, track="two", seed=3):
+def short_scenario(*settings: str, track: str = "two", seed: int = 3) -> Scenario:
     """A scenario of a few timesteps."""
     return scenarios.override(scenarios.load_track(track), [f"seed={seed}", *SHORT, *settings])
 
 
-def displacements(bag):
+def displacements(bag: Path) -> list[tuple[int, float, float, float]]:
     """What the follower says it drove, exactly as recorded."""
     return [
         (entry.stamp_ns, entry.motion.x_m, entry.motion.y_m, entry.motion.yaw_rad)
@@ -36,7 +42,13 @@ def displacements(bag):
     ]
 
 
-def launch(scenario, bag, *, on_start=None, **options):
+def launch(
+    scenario: Scenario,
+    bag: Path | None,
+    *,
+    on_start: Callable[[int, dict[str, int]], None] | None = None,
+    **options: Any,
+) -> RunResult:
     """Run a scenario through the node graph; returns the result.
 
     Once all processes run, `on_start` is called with the ROS domain and the process ids by node name.
@@ -44,16 +56,16 @@ def launch(scenario, bag, *, on_start=None, **options):
     launcher = Launcher(scenario, bag, **options)
     start = launcher._start
 
-    def observed(table, folder, environment):
+    def observed(table: list[Process], folder: Path, environment: dict[str, str]) -> None:
         start(table, folder, environment)
         if on_start is not None:
             on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in launcher._children})
 
-    launcher._start = observed
+    launcher._start = observed  # type: ignore[method-assign]
     return launcher.run()
 
 
-def formation(*arguments, timeout=300, **options):
+def formation(*arguments: object, timeout: float = 300, **options: Any) -> subprocess.CompletedProcess[str]:
     """Call the command line as a user does; neither it nor a node that it starts may give a Python warning."""
     command = [sys.executable, "-m", "robot_formation.cli", *map(str, arguments)]
     options["env"] = {**options.get("env", os.environ), **STRICT}
@@ -62,12 +74,12 @@ def formation(*arguments, timeout=300, **options):
     return completed
 
 
-def json_of(completed):
+def json_of(completed: subprocess.CompletedProcess[str]) -> Any:
     """Read what a verb printed with --json: nothing else may stand on standard output."""
     return json.loads(completed.stdout)
 
 
-def node_processes():
+def node_processes() -> set[int]:
     """Process ids of all node processes of this project on the machine."""
     found = set()
     for entry in Path("/proc").glob("[0-9]*/cmdline"):
@@ -79,7 +91,7 @@ def node_processes():
     return found
 
 
-def alive(pid):
+def alive(pid: int) -> bool:
     """Whether a process runs (a zombie does not)."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
@@ -90,12 +102,12 @@ def alive(pid):
 class BusyCores:
     """Keeps every core busy with processes of the same priority; a context manager."""
 
-    def __enter__(self):
+    def __enter__(self) -> BusyCores:
         code = "while True: pass"
         self._processes = [subprocess.Popen([sys.executable, "-S", "-c", code]) for _ in range(os.cpu_count() or 2)]
         return self
 
-    def __exit__(self, *error):
+    def __exit__(self, *error: object) -> None:
         for process in self._processes:
             process.kill()
             process.wait()
@@ -104,13 +116,13 @@ class BusyCores:
 class Killer:
     """Sends a signal to one node of a run, or to another process, when the run has finished a number of timesteps."""
 
-    def __init__(self, node, number, after_timesteps):
+    def __init__(self, node: str, number: signal.Signals, after_timesteps: int) -> None:
         self._node, self._number, self._after = node, number, after_timesteps
-        self.pids = {}
+        self.pids: dict[str, int] = {}
 
-    def started(self, domain, pids):
+    def started(self, domain: int, pids: Mapping[str, int]) -> None:
         self.pids = dict(pids)
 
-    def say(self, text):
+    def say(self, text: str) -> None:
         if text.startswith(f"timestep {self._after:2d}/"):
             os.kill(self.pids[self._node], self._number)

@@ -1,17 +1,25 @@
 """What tests of the predictors share."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from robot_formation.koopman.predictors import Predictor, PredictorParameters
+
+Array = npt.NDArray[np.float64]
+Timestep = tuple[Array, Array | None, Array | None]
+"""Displacement, residual and commanded displacement."""
 
 HISTORY = [(0.010, 0.050), (0.012, 0.049), (0.015, 0.051), (0.017, 0.047), (0.021, 0.048), (0.022, 0.045)]
 
 
-def predictor(name, **values):
+def predictor(name: str, **values: Any) -> Predictor:
     return Predictor(PredictorParameters(name=name, **values))
 
 
-def forecasts(name, history, **values):
+def forecasts(name: str, history: Sequence[Array | tuple[float, float]] | Array, **values: Any) -> Array:
     """The forecast after each displacement, without residuals."""
     found = predictor(name, **values)
     means = []
@@ -21,10 +29,10 @@ def forecasts(name, history, **values):
     return np.array(means)
 
 
-def timesteps(count, seed=0):
+def timesteps(count: int, seed: int = 0) -> list[Timestep]:
     """Displacement, residual and commanded displacement of noisy timesteps; some of the latter two are unknown."""
     rng = np.random.default_rng(seed)
-    found = []
+    found: list[Timestep] = []
     for t in range(count):
         x = np.array([0.01 * np.sin(t / 5.0), 0.05]) + rng.normal(0.0, (0.003, 0.002))
         r = None if rng.random() < 0.15 else rng.normal(0.0, (0.006, 0.003))
@@ -33,8 +41,9 @@ def timesteps(count, seed=0):
     return found
 
 
-def solve_2_by_2(x1, x2, y1, y2):
+def solve_2_by_2(x1: Array, x2: Array, y1: Array, y2: Array) -> Array:
     """K with K x1 = y1 and K x2 = y2, by Cramer's rule."""
     det = x1[0] * x2[1] - x2[0] * x1[1]
-    inverse = np.array([[x2[1], -x2[0]], [-x1[1], x1[0]]]) / det
-    return np.column_stack([y1, y2]) @ inverse
+    inverse: Array = np.array([[x2[1], -x2[0]], [-x1[1], x1[0]]]) / det
+    found: Array = np.column_stack([y1, y2]) @ inverse
+    return found

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
@@ -13,44 +16,44 @@ from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.writer import BagWriter
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-T = STORE.types
+T: dict[str, Any] = dict(STORE.types)
 SECOND = 10**9
 POSE_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 
 
-def header(stamp_ns, frame="base_link"):
+def header(stamp_ns: int, frame: str = "base_link") -> Any:
     sec, nanosec = divmod(stamp_ns, SECOND)
     return T["std_msgs/msg/Header"](T["builtin_interfaces/msg/Time"](sec, nanosec), frame)
 
 
-def pose(x, y, yaw=0.0, z=0.0):
+def pose(x: float, y: float, yaw: float = 0.0, z: float = 0.0) -> Any:
     point = T["geometry_msgs/msg/Point"](x, y, z)
     return T["geometry_msgs/msg/Pose"](
         point, T["geometry_msgs/msg/Quaternion"](0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
     )
 
 
-def pose_with_covariance(stamp_ns, x, y, yaw=0.0):
+def pose_with_covariance(stamp_ns: int, x: float, y: float, yaw: float = 0.0) -> Any:
     with_covariance = T["geometry_msgs/msg/PoseWithCovariance"](pose(x, y, yaw), np.zeros(36))
     return T[POSE_COVARIANCE](header(stamp_ns), with_covariance)
 
 
-def odometry(stamp_ns, x, y, yaw, z=0.0):
+def odometry(stamp_ns: int, x: float, y: float, yaw: float, z: float = 0.0) -> Any:
     zero = T["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
     twist = T["geometry_msgs/msg/TwistWithCovariance"](T["geometry_msgs/msg/Twist"](zero, zero), np.zeros(36))
     with_covariance = T["geometry_msgs/msg/PoseWithCovariance"](pose(x, y, yaw, z), np.zeros(36))
     return T["nav_msgs/msg/Odometry"](header(stamp_ns, "world"), "base_link", with_covariance, twist)
 
 
-def text(words):
+def text(words: str) -> Any:
     return T["std_msgs/msg/String"](words)
 
 
-def bowl_height(x, y):
+def bowl_height(x: float, y: float) -> float:
     return 0.05 + ((x - 0.89) ** 2 + (y - 0.89) ** 2) / 10.0
 
 
-def surface_marker(cells=24, size=1.78):
+def surface_marker(cells: int = 24, size: float = 1.78) -> Any:
     grid = np.linspace(0.0, size, cells + 1)
     points = []
     for i in range(cells):
@@ -98,7 +101,13 @@ class Step:
 class SyntheticRun:
     """Writes a run timestep by timestep; simulated time goes on by a second per event."""
 
-    def __init__(self, writer: BagWriter, followers: int = 1, leader=(1.412, 0.111, 0.75 * math.pi), surface=True):
+    def __init__(
+        self,
+        writer: BagWriter,
+        followers: int = 1,
+        leader: tuple[float, float, float] = (1.412, 0.111, 0.75 * math.pi),
+        surface: bool = True,
+    ) -> None:
         self.writer = writer
         self.now = 0
         self.leader = leader
@@ -116,27 +125,31 @@ class SyntheticRun:
             self.place(robot, (0.0, 0.0), number * 0.32, 0.0)
             self.alignment_move(robot)
 
-    def topic(self, name, type_name):
+    def topic(self, name: str, type_name: str) -> None:
         self.writer.add_topic(name, type_name, TopicQos(history="keep_all", depth=0))
 
-    def send(self, topic, message):
+    def send(
+        self,
+        topic: str,
+        message: Any,
+    ) -> None:
         self.writer.write(topic, bytes(STORE.serialize_cdr(message, message.__msgtype__)), self.now)
 
-    def tick(self):
+    def tick(self) -> None:
         self.now += SECOND
 
-    def odom(self, robot, x, y, yaw):
+    def odom(self, robot: str, x: float, y: float, yaw: float) -> None:
         self.send(f"/ground_truth/{robot}/odom", odometry(self.now, x, y, yaw, bowl_height(x, y)))
 
-    def moved(self, robot, u, v, yaw=0.0):
+    def moved(self, robot: str, u: float, v: float, yaw: float = 0.0) -> None:
         self.tick()
         self.send(f"/{robot}/moved", pose_with_covariance(self.now, v, -u, yaw))
 
-    def alignment_move(self, robot):
+    def alignment_move(self, robot: str) -> None:
         """A move of timestep 0, which belongs to no timestep."""
         self.moved(robot, 0.5, 0.5)
 
-    def place(self, robot, error, right, heading_error):
+    def place(self, robot: str, error: tuple[float, float], right: float, heading_error: float) -> None:
         x, y, yaw = self.leader
         forward, left = error[1], -error[0] - right
         c, s = math.cos(yaw), math.sin(yaw)
@@ -157,13 +170,13 @@ class SyntheticRun:
             if step.finished:
                 self.finish(robot, step)
 
-    def leader_moves(self):
+    def leader_moves(self) -> None:
         x, y, yaw = self.leader
         self.leader = (x + 0.05 * math.cos(yaw), y + 0.05 * math.sin(yaw), yaw)
         self.moved("leader", 0.0, 0.05)
         self.odom("leader", *self.leader)
 
-    def finish(self, robot, step):
+    def finish(self, robot: str, step: Step) -> None:
         u, v = step.moved
         self.send(f"/{robot}/displacement", pose_with_covariance(self.now, v, -u))
         self.send(f"/{robot}/residual", pose_with_covariance(self.now, step.residual[1], -step.residual[0]))
@@ -171,7 +184,7 @@ class SyntheticRun:
             self.send(f"/{robot}/prediction", pose_with_covariance(self.now, step.prediction[1], -step.prediction[0]))
         self.send(f"/{robot}/alignment", text("aligned"))
 
-    def lose(self, robot):
+    def lose(self, robot: str) -> None:
         self.tick()
         self.send(f"/{robot}/alignment", text("lost"))
 
@@ -193,7 +206,16 @@ STEPS = [
 ]
 
 
-def write_run(path, steps, *, followers=1, details=None, lost=(), surface=True, missing=()):
+def write_run(
+    path: Path,
+    steps: Sequence[Step],
+    *,
+    followers: int = 1,
+    details: dict[str, str] | None = None,
+    lost: Sequence[str] | tuple[()] = (),
+    surface: bool = True,
+    missing: tuple[()] = (),
+) -> Path:
     with BagWriter(path) as writer:
         if details is not None:
             writer.write_metadata(METADATA_NAME, details)

@@ -2,12 +2,15 @@
 
 import functools
 import json
+from pathlib import Path
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from repository import ROOT
 from robot_formation.parameters import from_mapping
+from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import checked
 from robot_formation.vision.pixy2.signatures import Signature
@@ -25,14 +28,24 @@ RED, GREEN, BLUE = (196, 43, 43), (43, 161, 61), (43, 75, 201)
 """Colours that the signatures 1, 2 and 3 of group G1 were taught from."""
 
 
+def stored_picture(file: Path) -> npt.NDArray[np.uint8]:
+    """A picture file's BGR pixels."""
+    stored = cv2.imread(str(file))
+    assert stored is not None, file
+    return stored.astype(np.uint8, copy=False)
+
+
 @functools.cache
-def picture(name):
+def picture(name: str) -> npt.NDArray[np.uint8]:
     """A picture of the examples at full width; columns that are not kept repeat their left neighbour."""
-    image = cv2.cvtColor(cv2.imread(str(DATA / name)), cv2.COLOR_BGR2RGB)
+    image = stored_picture(DATA / name)[:, :, ::-1]
     return np.repeat(image, 316 // image.shape[1], axis=1)
 
 
-def canvas(*rectangles, background=(110, 112, 115)):
+def canvas(
+    *rectangles: tuple[tuple[int, int, int, int], tuple[int, int, int]],
+    background: tuple[int, int, int] = (110, 112, 115),
+) -> npt.NDArray[np.uint8]:
     """A picture with rectangles ((left, top, width, height), colour)."""
     image = np.empty((208, 316, 3), np.uint8)
     image[:] = background
@@ -41,7 +54,7 @@ def canvas(*rectangles, background=(110, 112, 115)):
     return image
 
 
-def random_picture(rng):
+def random_picture(rng: np.random.Generator) -> npt.NDArray[np.uint8]:
     """Blobs of the colours of group G1, shaded, overlapping and holed, on noise, sometimes with coloured specks."""
     image = np.empty((208, 316, 3))
     image[:] = rng.integers(0, 256, 3) if rng.random() < 0.3 else rng.integers(30, 220)
@@ -59,7 +72,7 @@ def random_picture(rng):
     return np.clip(image, 0, 255).astype(np.uint8)
 
 
-def row_segments(detector, picture):
+def row_segments(detector: BlockDetector, picture: npt.NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
     """A detector's row segments (signature, row, start cell, length) in the order of the scan; a cell is 2 x 1 px."""
     found = detector._scanner.scan(checked(picture))
     columns = (found.signature, found.row, found.start, found.end - found.start)

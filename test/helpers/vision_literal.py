@@ -3,17 +3,24 @@
 Nothing here is shared with the package except the stored signatures and the parameters.
 """
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
+
+from robot_formation.vision.pixy2.parameters import DetectorParameters
+from robot_formation.vision.pixy2.signatures import Signature
 
 
-def divide(numerator, denominator):
+def divide(numerator: int, denominator: int) -> int:
     """Integer division as in C."""
     quotient = abs(numerator) // abs(denominator)
     return quotient if (numerator < 0) == (denominator < 0) else -quotient
 
 
 class LiteralDetector:
-    def __init__(self, signatures, parameters):
+    def __init__(self, signatures: Sequence[Signature], parameters: DetectorParameters) -> None:
         self.parameters = parameters
         self.min_y = max(1, int(np.float32(765) * np.float32(parameters.min_brightness)))
         self.limits = {}
@@ -32,11 +39,11 @@ class LiteralDetector:
             ]
         self.table = self._table()
 
-    def _inside(self, sig, u, v):
+    def _inside(self, sig: int, u: int, v: int) -> bool:
         u_min, u_max, v_min, v_max = self.limits[sig]
         return u_min < u < u_max and v_min < v < v_max
 
-    def _table(self):
+    def _table(self) -> list[int]:
         table = [0] * 4096
         for r in range(0, 256, 4):
             for g in range(0, 256, 4):
@@ -54,7 +61,7 @@ class LiteralDetector:
                             break
         return table
 
-    def hits(self, picture, y):
+    def hits(self, picture: npt.NDArray[np.uint8], y: int) -> list[tuple[int, int, int, int, int]]:
         """Hits (signature, column, u, v, sum) of row y."""
         cells = picture[y, ::2].tolist()
         label = [self.table[64 * (((r - g) >> 3) & 63) + (((b - g) >> 3) & 63)] for r, g, b in cells]
@@ -74,7 +81,7 @@ class LiteralDetector:
             i += 4
         return found
 
-    def row_segments(self, picture):
+    def row_segments(self, picture: npt.NDArray[np.uint8]) -> list[tuple[int, int, int, int]]:
         """Segments (signature, row, start, length)."""
         output = []
         for y in range(208):
@@ -96,14 +103,14 @@ class LiteralDetector:
                 output.append((current[0], y, current[1] - 1, current[2] - current[1] + 1))
         return output
 
-    def detect(self, picture):
+    def detect(self, picture: npt.NDArray[np.uint8]) -> list[tuple[int, int, int, int, int]]:
         """Boxes (signature, left, right, top, bottom)."""
         segments = self.row_segments(picture)
         parameters = self.parameters
-        boxes = []
+        boxes: list[list[int]] = []
         stored = 0
         for sig in self.limits:
-            mine = []
+            mine: list[list[int]] = []
             blobs = connected([(y, start, start + length) for s, y, start, length in segments if s == sig])
             for blob in blobs[: parameters.max_blocks_per_signature]:
                 if stored == parameters.max_blocks:
@@ -113,17 +120,21 @@ class LiteralDetector:
                 mine.append([sig, 2 * blob["left"], 2 * blob["right"], blob["top"], blob["last"][0]])
                 stored += 1
             boxes += merged(mine, parameters.max_merge_dist)
-        return [tuple(box) for box in denested(boxes)]
+        return [(sig, left, right, top, bottom) for sig, left, right, top, bottom in denested(boxes)]
 
 
-def connected(segments):
+Blob = dict[str, Any]
+"""Sides `left`, `right` and `top`, `area`, and the rows `last` and `next`: [row, start, end], or None."""
+
+
+def connected(segments: Sequence[tuple[int, int, int]]) -> list[Blob]:
     """Blobs of one signature, largest area first; `last` and `next` are [row, start, end] or None."""
-    blobs = []
-    finished = []
-    current_row = None
+    blobs: list[Blob] = []
+    finished: list[Blob] = []
+    current_row = -1
     cursor = 0
 
-    def check(position):
+    def check(position: int) -> None:
         while position < len(blobs):
             blob = blobs[position]
             if blob["next"]:
@@ -168,7 +179,7 @@ def connected(segments):
                     check(cursor + 1)
                 break
         if not attached:
-            new = {"left": s, "right": e, "top": row, "area": e - s + 1, "last": [row, s, e], "next": None}
+            new: Blob = {"left": s, "right": e, "top": row, "area": e - s + 1, "last": [row, s, e], "next": None}
             blobs.insert(cursor, new)
             cursor += 1
     for blob in blobs:
@@ -178,7 +189,7 @@ def connected(segments):
     return sorted(finished, key=lambda blob: -blob["area"])
 
 
-def merged(boxes, distance):
+def merged(boxes: list[list[int]], distance: int) -> list[list[int]]:
     alive = [True] * len(boxes)
     changed = True
     while changed:
@@ -194,7 +205,7 @@ def merged(boxes, distance):
     return [box for box, is_alive in zip(boxes, alive, strict=True) if is_alive]
 
 
-def try_merge(box, other, along, across, m):
+def try_merge(box: list[int], other: Sequence[int], along: int, across: int, m: int) -> bool:
     """Try one axis; `along` and `across` index the lower sides, the upper ones follow."""
     A0, B0, C0, D0 = box[along], box[along + 1], box[across], box[across + 1]
     A1, B1, C1, D1 = other[along], other[along + 1], other[across], other[across + 1]
@@ -210,8 +221,8 @@ def try_merge(box, other, along, across, m):
     return True
 
 
-def denested(boxes):
-    def contains(a, b):
+def denested(boxes: list[list[int]]) -> list[list[int]]:
+    def contains(a: Sequence[int], b: Sequence[int]) -> bool:
         return a[1] <= b[1] and b[2] <= a[2] and a[3] <= b[3] and b[4] <= a[4]
 
     alive = [True] * len(boxes)

@@ -1,14 +1,17 @@
 """What the tests of the world share."""
 
 import math
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeVar
 
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
+from robot_formation.world.events import BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.start import RobotStart
 from robot_formation.world.world import World
 
-IDEAL = {
+IDEAL: dict[str, Any] = {
     "imperfections": {
         "rolling_radius": 0.0,
         "motor_gain": 0.0,
@@ -26,27 +29,36 @@ PAIR = (
 )
 
 
-def parameters(**values):
+AnyEvent = TypeVar("AnyEvent", Frame, JointStates, LeftPlate, RobotPose)
+
+
+def parameters(**values: Any) -> WorldParameters:
     return from_mapping(WorldParameters, values, where="test")
 
 
-def world(surface="plane", robots=PAIR, *, seed=1, **values):
+def world(
+    surface: str = "plane",
+    robots: Sequence[RobotStart] = PAIR,
+    *,
+    seed: int = 1,
+    **values: Any,
+) -> World:
     return World(make_surface(surface), robots, parameters(**values), seed=seed)
 
 
-def run(a_world):
+def run(a_world: World) -> list[Event]:
     """Advance until nothing is owed; all events."""
-    events = []
+    events: list[Event] = []
     while batch := a_world.advance():
         events += batch
     return events
 
 
-def of_kind(events, kind, robot=None):
+def of_kind(events: Iterable[Any], kind: type[AnyEvent], robot: str | None = None) -> list[AnyEvent]:
     return [event for event in events if isinstance(event, kind) and robot in (None, event.robot)]
 
 
-def displacement(a_world, robot, start):
+def displacement(a_world: World, robot: str, start: BodyState) -> tuple[float, float, float]:
     """Forward, left and turn from a body state to the present one, in the frame of the former."""
     now = a_world.ground_truth(robot)
     c, s = math.cos(start.yaw_rad), math.sin(start.yaw_rad)

@@ -1,8 +1,10 @@
 """Dictionaries say what they compute, compute what they say, and fit together."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,6 +22,7 @@ from robot_formation.koopman import (
     RadialBasis,
     Rows,
 )
+from robot_formation.koopman.dictionaries import Observables
 
 X = np.array([[0.5, -1.0, 2.0, 0.0], [3.0, 0.25, -2.0, 1.0]])
 CENTRES = np.array([[0.0, 2.0], [1.0, -2.0]])
@@ -44,7 +47,7 @@ EXAMPLES = {
 
 
 @pytest.mark.parametrize("psi", EXAMPLES.values(), ids=EXAMPLES.keys())
-def test_every_dictionary_keeps_the_protocol(psi):
+def test_every_dictionary_keeps_the_protocol(psi: Observables) -> None:
     lifted = psi(X)
     assert lifted.shape == (psi.size, X.shape[1] - psi.history)
     assert np.isfinite(lifted).all()
@@ -68,17 +71,19 @@ def test_every_dictionary_keeps_the_protocol(psi):
         ([["a", "b", "c", "d"]] * 2, "real numbers"),
     ],
 )
-def test_every_dictionary_refuses_states_that_are_none(psi, states, message):
+def test_every_dictionary_refuses_states_that_are_none(
+    psi: Observables, states: list[list[str]] | npt.NDArray[np.float64], message: str
+) -> None:
     with pytest.raises(KoopmanError, match=message):
         psi(states)
 
 
-def test_an_observable_that_overflows_is_named():
+def test_an_observable_that_overflows_is_named() -> None:
     with pytest.raises(KoopmanError, match=r"the observable x1\^2 overflows"):
         (Identity(2) + Monomials([(2, 0)]))(np.array([[1e200], [1.0]]))
 
 
-def test_monomials_come_by_degree_and_then_by_falling_powers_of_the_first_variables():
+def test_monomials_come_by_degree_and_then_by_falling_powers_of_the_first_variables() -> None:
     assert Monomials.to_degree(2, 3).names == (
         "x1",
         "x2",
@@ -101,7 +106,9 @@ def test_monomials_come_by_degree_and_then_by_falling_powers_of_the_first_variab
     lowest=st.integers(0, 1),
     data=st.data(),
 )
-def test_monomials_are_all_products_of_powers_up_to_the_degree(dimension, degree, lowest, data):
+def test_monomials_are_all_products_of_powers_up_to_the_degree(
+    dimension: int, degree: int, lowest: int, data: st.DataObject
+) -> None:
     degree = max(degree, lowest)
     psi = Monomials.to_degree(dimension, degree, lowest=lowest)
     assert psi.size == len(set(psi.names)) == math.comb(dimension + degree, degree) - lowest
@@ -112,13 +119,13 @@ def test_monomials_are_all_products_of_powers_up_to_the_degree(dimension, degree
         assert row == pytest.approx(np.broadcast_to(expected, 3), rel=1e-12)
 
 
-def test_monomials_of_chosen_exponents_find_the_state_among_them():
+def test_monomials_of_chosen_exponents_find_the_state_among_them() -> None:
     psi = Monomials([(0, 1), (2, 1), (1, 0)])
     assert psi.names == ("x2", "x1^2 x2", "x1")
     assert psi.state_rows == (2, 0)
 
 
-def test_radial_basis_functions_are_their_formulas():
+def test_radial_basis_functions_are_their_formulas() -> None:
     r = np.linalg.norm(X[:, None, :] - CENTRES[:, :, None], axis=0) / 0.7
     assert RadialBasis(CENTRES, width=0.7)(X) == pytest.approx(np.exp(-(r**2)))
     assert RadialBasis(CENTRES, "inverse_quadratic", width=0.7)(X) == pytest.approx(1 / (1 + r**2))
@@ -127,11 +134,11 @@ def test_radial_basis_functions_are_their_formulas():
     assert RadialBasis(CENTRES, "thin_plate", width=0.7)(X) == pytest.approx(expected)
 
 
-def test_a_thin_plate_is_zero_at_its_centre():
+def test_a_thin_plate_is_zero_at_its_centre() -> None:
     assert RadialBasis(CENTRES, "thin_plate")(CENTRES).diagonal() == pytest.approx(0.0, abs=0.0)
 
 
-def test_centres_chosen_from_data_are_different_snapshots_and_the_same_for_the_same_seed():
+def test_centres_chosen_from_data_are_different_snapshots_and_the_same_for_the_same_seed() -> None:
     data = np.random.default_rng(1).normal(size=(2, 50)).round(1)
     psi = RadialBasis.from_data(data, 12, np.random.default_rng(5))
     again = RadialBasis.from_data(data, 12, np.random.default_rng(5))
@@ -145,31 +152,31 @@ def test_centres_chosen_from_data_are_different_snapshots_and_the_same_for_the_s
     assert psi.width == pytest.approx(np.median(distances))
 
 
-def test_centres_chosen_from_data_are_spread_out():
+def test_centres_chosen_from_data_are_spread_out() -> None:
     clusters = np.repeat(np.array([[0.0, 100.0, 0.0], [0.0, 0.0, 100.0]]), [500, 2, 2], axis=1)
     clusters = clusters + np.random.default_rng(0).normal(size=clusters.shape)
     psi = RadialBasis.from_data(clusters, 3, np.random.default_rng(2))
     assert {tuple(corner) for corner in (psi.centres > 50).T} == {(False, False), (True, False), (False, True)}
 
 
-def test_more_centres_than_different_snapshots_are_refused():
+def test_more_centres_than_different_snapshots_are_refused() -> None:
     with pytest.raises(KoopmanError, match="only 1 snapshots are different"):
         RadialBasis.from_data(np.ones((2, 9)), 2, np.random.default_rng(0))
 
 
-def test_delays_stack_the_latest_states_newest_first():
+def test_delays_stack_the_latest_states_newest_first() -> None:
     psi = DelayEmbedding(2, 2, variables=["u", "v"])
     assert psi.names == ("u", "v", "u(t-1)", "v(t-1)", "u(t-2)", "v(t-2)")
     assert (psi(X) == np.vstack([X[:, 2:], X[:, 1:3], X[:, 0:2]])).all()
     assert psi.state_rows == (0, 1)
 
 
-def test_too_short_a_trajectory_is_refused():
+def test_too_short_a_trajectory_is_refused() -> None:
     with pytest.raises(KoopmanError, match="at least 3 consecutive columns"):
         DelayEmbedding(2, 2)(X[:, :2])
 
 
-def test_parts_of_different_history_are_aligned_at_the_newest_state():
+def test_parts_of_different_history_are_aligned_at_the_newest_state() -> None:
     psi = DelayEmbedding(2, 2) + Identity(2)
     lifted = psi(X)
     assert (lifted[:2] == lifted[6:]).all()
@@ -177,13 +184,13 @@ def test_parts_of_different_history_are_aligned_at_the_newest_state():
     assert (product(X)[0] == X[0, 1:] ** 2).all()
 
 
-def test_a_concatenation_finds_each_component_of_the_state_in_any_part():
+def test_a_concatenation_finds_each_component_of_the_state_in_any_part() -> None:
     psi = Constant(2) + Rows(Identity(1), [1], 2) + Rows(Identity(1), [0], 2)
     assert psi.state_rows == (2, 1)
     assert Concatenation(Constant(2), Rows(Identity(1), [1], 2)).state_rows == (None, 1)
 
 
-def test_a_product_holds_all_products_in_the_order_it_says():
+def test_a_product_holds_all_products_in_the_order_it_says() -> None:
     left, right = Identity(2), Constant(2) + Monomials([(0, 2)])
     product = left * right
     assert product.names == ("x1", "x1 x2^2", "x2", "x2 x2^2")
@@ -193,7 +200,7 @@ def test_a_product_holds_all_products_in_the_order_it_says():
     assert Product(left, left).state_rows == (None, None)
 
 
-def test_inputs_are_the_lower_rows_and_bilinear_terms_can_be_built():
+def test_inputs_are_the_lower_rows_and_bilinear_terms_can_be_built() -> None:
     stacked = np.vstack([X, [[7.0, 8.0, 9.0, 10.0]]])
     inputs = Inputs(2, 1)
     assert inputs.names == ("u1",)
@@ -211,7 +218,7 @@ def test_inputs_are_the_lower_rows_and_bilinear_terms_can_be_built():
         (lambda: Identity(2, ["u"]), "2 names"),
         (lambda: Identity(1, ["1"]), "none of them '1'"),
         (lambda: Monomials([]), "table of integers"),
-        (lambda: Monomials([(0.5, 1.0)]), "table of integers"),
+        (lambda: Monomials([(0.5, 1.0)]), "table of integers"),  # type: ignore[list-item]
         (lambda: Monomials([(1, -1)]), "table of integers"),
         (lambda: Monomials.to_degree(2, 1, lowest=2), "lowest <= degree"),
         (lambda: Monomials.to_degree(0, 1), "dimension of at least 1"),
@@ -232,6 +239,6 @@ def test_inputs_are_the_lower_rows_and_bilinear_terms_can_be_built():
         (lambda: Identity(2) * Identity(3), "same length"),
     ],
 )
-def test_dictionaries_that_make_no_sense_are_refused(make, message):
+def test_dictionaries_that_make_no_sense_are_refused(make: Callable[[], object], message: str) -> None:
     with pytest.raises(KoopmanError, match=message):
         make()

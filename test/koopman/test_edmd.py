@@ -1,12 +1,16 @@
 """EDMD finds the Koopman operators that are known, agrees with pykoop, and survives poor data."""
 
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cases import case
 from koopman_helpers import DT, LAMBDA, MU, SLOPE, slow_manifold
 from robot_formation.koopman import (
     EDMD,
@@ -21,29 +25,32 @@ from robot_formation.koopman import (
     Rows,
     spectrum,
 )
+from robot_formation.koopman.dictionaries import Dictionary
+
+Array = npt.NDArray[np.float64]
 
 PSI = Identity(2) + Monomials([(2, 0)])
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def states(seed, count=40, dimension=2):
+def states(seed: int, count: int = 40, dimension: int = 2) -> Array:
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (dimension, count))
 
 
-def slow_manifold_model(seed=0, **options):
+def slow_manifold_model(seed: int = 0, **options: Any) -> EDMD:
     X = states(seed)
     return EDMD.fit(PSI, X, slow_manifold(X), dt=DT, **options)
 
 
 @settings(deadline=None, max_examples=30)
 @given(seed=SEEDS)
-def test_the_slow_manifold_has_the_eigenvalues_mu_lambda_and_twice_mu(seed):
+def test_the_slow_manifold_has_the_eigenvalues_mu_lambda_and_twice_mu(seed: int) -> None:
     found = slow_manifold_model(seed).continuous_eigenvalues
     assert found.imag == pytest.approx(0.0, abs=1e-8)
     assert found.real == pytest.approx([MU, 2 * MU, LAMBDA], abs=1e-8)  # by falling modulus
 
 
-def test_the_slow_manifold_has_its_three_eigenfunctions():
+def test_the_slow_manifold_has_its_three_eigenfunctions() -> None:
     model = slow_manifold_model()
     x1, x2 = X = states(1)
     for found, true in zip(model.eigenfunctions(X), (x1, x1**2, x2 - SLOPE * x1**2), strict=True):
@@ -52,7 +59,7 @@ def test_the_slow_manifold_has_its_three_eigenfunctions():
     assert np.abs(model.spectrum.left).max(axis=1) == pytest.approx(1.0)
 
 
-def test_eigenfunctions_grow_by_their_eigenvalue_in_each_step():
+def test_eigenfunctions_grow_by_their_eigenvalue_in_each_step() -> None:
     model = slow_manifold_model()
     X = states(2)
     later = model.eigenfunctions(slow_manifold(X))
@@ -60,7 +67,7 @@ def test_eigenfunctions_grow_by_their_eigenvalue_in_each_step():
 
 
 @pytest.mark.parametrize("relift", [False, True])
-def test_predictions_of_an_invariant_dictionary_are_exact_over_many_steps(relift):
+def test_predictions_of_an_invariant_dictionary_are_exact_over_many_steps(relift: bool) -> None:
     model = slow_manifold_model()
     start = np.array([[0.8], [-0.5]])
     predicted = model.predict(start, 60, relift=relift)
@@ -70,7 +77,7 @@ def test_predictions_of_an_invariant_dictionary_are_exact_over_many_steps(relift
     assert model.predict(start, 0).shape == (2, 0)
 
 
-def test_modes_and_eigenfunctions_compose_the_prediction():
+def test_modes_and_eigenfunctions_compose_the_prediction() -> None:
     model = slow_manifold_model()
     start = np.array([[0.8], [-0.5]])
     phi = model.eigenfunctions(start)[:, 0]
@@ -81,7 +88,7 @@ def test_modes_and_eigenfunctions_compose_the_prediction():
         assert composed.real == pytest.approx(predicted[:, step], abs=1e-10)
 
 
-def test_an_oscillation_has_conjugate_eigenvalues_of_its_frequency_and_damping():
+def test_an_oscillation_has_conjugate_eigenvalues_of_its_frequency_and_damping() -> None:
     damping, omega, dt = -0.1, 2.0, 0.2
     c, s = np.cos(omega * dt), np.sin(omega * dt)
     truth = np.exp(damping * dt) * np.array([[c, -s], [s, c]])
@@ -92,7 +99,7 @@ def test_an_oscillation_has_conjugate_eigenvalues_of_its_frequency_and_damping()
     assert model.modes @ model.eigenfunctions(X) == pytest.approx(X.astype(complex), abs=1e-12)
 
 
-def test_the_identity_dictionary_gives_dmd_and_a_constant_learns_an_offset():
+def test_the_identity_dictionary_gives_dmd_and_a_constant_learns_an_offset() -> None:
     X = states(4)
     offset = np.array([[0.3], [-0.2]])
     truth = np.array([[0.9, 0.1], [0.0, 0.7]])
@@ -107,7 +114,7 @@ def test_the_identity_dictionary_gives_dmd_and_a_constant_learns_an_offset():
 
 @settings(deadline=None, max_examples=40)
 @given(n=st.integers(1, 5), ridge=st.sampled_from([0.0, 1e-3, 1.0, 50.0]), seed=SEEDS)
-def test_k_minimises_the_ridge_problem_and_equals_an_augmented_lstsq(n, ridge, seed):
+def test_k_minimises_the_ridge_problem_and_equals_an_augmented_lstsq(n: int, ridge: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     X, Y = rng.normal(size=(2, n, 30))
     weights = rng.uniform(0.1, 3.0, 30)
@@ -118,7 +125,7 @@ def test_k_minimises_the_ridge_problem_and_equals_an_augmented_lstsq(n, ridge, s
     assert model.condition_number == pytest.approx(np.linalg.cond(X * np.sqrt(weights)))
 
 
-def test_truncation_uses_the_strongest_directions_only():
+def test_truncation_uses_the_strongest_directions_only() -> None:
     rng = np.random.default_rng(5)
     X = np.linalg.qr(rng.normal(size=(4, 4)))[0] @ np.diag([1.0, 0.5, 1e-3, 1e-4]) @ rng.normal(size=(4, 30))
     Y = rng.normal(size=(4, 30))
@@ -135,7 +142,7 @@ def test_truncation_uses_the_strongest_directions_only():
 
 @pytest.mark.parametrize("alpha", [0.0, 0.5])
 @pytest.mark.parametrize("degree", [1, 3])
-def test_pykoop_agrees_with_lifted_and_regularized_fits(alpha, degree):
+def test_pykoop_agrees_with_lifted_and_regularized_fits(alpha: float, degree: int) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         pykoop = pytest.importorskip("pykoop")
@@ -155,7 +162,7 @@ def test_pykoop_agrees_with_lifted_and_regularized_fits(alpha, degree):
     assert k == pytest.approx(model.k[np.ix_(our_order, our_order)], abs=1e-9)
 
 
-def test_pykoop_agrees_with_a_fit_with_inputs():
+def test_pykoop_agrees_with_a_fit_with_inputs() -> None:
     rng = np.random.default_rng(7)
     X, U = rng.normal(size=(2, 60)), rng.normal(size=(1, 60))
     Y = rng.normal(size=(2, 60))
@@ -168,7 +175,7 @@ def test_pykoop_agrees_with_a_fit_with_inputs():
     assert k_and_b == pytest.approx(np.hstack([model.k, model.b]), abs=1e-9)
 
 
-def test_linear_inputs_are_identified_and_predicted_with():
+def test_linear_inputs_are_identified_and_predicted_with() -> None:
     rng = np.random.default_rng(8)
     a, b = np.array([[0.9, 0.2], [-0.1, 0.8]]), np.array([[0.5], [1.0]])
     X, U = rng.normal(size=(2, 40)), rng.normal(size=(1, 40))
@@ -184,11 +191,11 @@ def test_linear_inputs_are_identified_and_predicted_with():
             assert predicted[:, step] == pytest.approx(state[:, 0], abs=1e-10)
 
 
-def test_inputs_may_enter_by_any_dictionary_of_state_and_input():
+def test_inputs_may_enter_by_any_dictionary_of_state_and_input() -> None:
     rng = np.random.default_rng(9)
     X, U = rng.normal(size=(2, 60)), rng.normal(size=(1, 60))
 
-    def step(x, u):
+    def step(x: Array, u: Array) -> Array:
         return np.array([0.9 * x[0] + 0.3 * x[0] * u[0], 0.7 * x[1] + u[0] ** 2])
 
     theta = Rows(Identity(2), [0, 1], 3) * Inputs(2, 1) + Rows(Monomials([[2]], ["u1"]), [2], 3)
@@ -203,7 +210,7 @@ def test_inputs_may_enter_by_any_dictionary_of_state_and_input():
 
 
 @pytest.mark.parametrize("relift", [False, True])
-def test_delays_find_the_hidden_part_of_a_state(relift):
+def test_delays_find_the_hidden_part_of_a_state(relift: bool) -> None:
     # Of a rotation only one coordinate is seen: alone it says nothing of its future, with one delay it says all.
     angle = 0.3
     seen = np.cos(angle * np.arange(60))[None]
@@ -215,7 +222,7 @@ def test_delays_find_the_hidden_part_of_a_state(relift):
     assert model.eigenfunctions(seen[:, :2]).shape == (2, 1)
 
 
-def test_a_trajectory_and_its_pairs_give_the_same_fit_and_trajectories_are_not_joined():
+def test_a_trajectory_and_its_pairs_give_the_same_fit_and_trajectories_are_not_joined() -> None:
     rng = np.random.default_rng(10)
     path, other, u, w = rng.normal(size=(2, 20)), rng.normal(size=(2, 9)), rng.normal(size=19), rng.normal(size=8)
     psi = DelayEmbedding(2, 2)
@@ -235,7 +242,7 @@ def test_a_trajectory_and_its_pairs_give_the_same_fit_and_trajectories_are_not_j
     assert np.hstack([both.k, both.b]) == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_state_that_is_no_observable_is_reconstructed_by_least_squares():
+def test_a_state_that_is_no_observable_is_reconstructed_by_least_squares() -> None:
     X = states(11, 200)
     psi = RadialBasis.from_data(X, 25, np.random.default_rng(0), width=1.0)
     model = EDMD.fit(psi, X, slow_manifold(X))
@@ -247,7 +254,7 @@ def test_a_state_that_is_no_observable_is_reconstructed_by_least_squares():
     assert (exact.reconstruct((psi + Identity(2))(held_out)) == held_out).all()
 
 
-def test_relifting_keeps_to_the_lifted_states_where_the_dictionary_is_not_invariant():
+def test_relifting_keeps_to_the_lifted_states_where_the_dictionary_is_not_invariant() -> None:
     # The logistic map: x^2 of the next state is no combination of x and x^2.
     x = states(13, 100, 1) * 0.45 + 0.5
     logistic = 3.2 * x * (1 - x)
@@ -262,7 +269,7 @@ def test_relifting_keeps_to_the_lifted_states_where_the_dictionary_is_not_invari
     assert np.abs(once - truth).max() > 0.05
 
 
-def test_errors_are_root_mean_squares_of_the_columns_norms():
+def test_errors_are_root_mean_squares_of_the_columns_norms() -> None:
     rng = np.random.default_rng(14)
     X, Y, P, Q = rng.normal(size=(4, 2, 20))
     model = EDMD.fit(Identity(2), X, Y)
@@ -284,11 +291,21 @@ POOR = {
 }
 
 
-@pytest.mark.parametrize("psi", [Identity(2), PSI + Constant(2), DelayEmbedding(2, 1)], ids=["state", "lifted", "late"])
-@pytest.mark.parametrize("how", [Regularization(), Regularization(ridge=1e-6), Regularization(rank=1)], ids=str)
 @pytest.mark.parametrize("history", POOR.values(), ids=POOR.keys())
 @pytest.mark.filterwarnings("error")
-def test_poor_data_give_a_finite_model_or_a_sentence(psi, how, history):
+def test_poor_data_give_a_finite_model_or_a_sentence(history: Array) -> None:
+    dictionaries: dict[str, Dictionary] = {
+        "state": Identity(2),
+        "lifted": PSI + Constant(2),
+        "late": DelayEmbedding(2, 1),
+    }
+    for name, psi in dictionaries.items():
+        for how in (Regularization(), Regularization(ridge=1e-6), Regularization(rank=1)):
+            with case(name, how):
+                check_poor_data(psi, how, history)
+
+
+def check_poor_data(psi: Dictionary, how: Regularization, history: Array) -> None:
     if history.shape[1] < psi.history + 2:
         with pytest.raises(KoopmanError, match="too short"):
             EDMD.fit_trajectories(psi, [history])
@@ -303,7 +320,7 @@ def test_poor_data_give_a_finite_model_or_a_sentence(psi, how, history):
         assert model.predict(start, 5) == pytest.approx(history[:, :5])
 
 
-def test_constant_and_collinear_data_have_an_infinite_condition_number():
+def test_constant_and_collinear_data_have_an_infinite_condition_number() -> None:
     for history in (POOR["zero"], POOR["one pair"]):
         assert EDMD.fit_trajectories(Identity(2), [history]).condition_number == float("inf")
     for history in (POOR["constant"], POOR["collinear"]):
@@ -312,14 +329,14 @@ def test_constant_and_collinear_data_have_an_infinite_condition_number():
         assert model.rank == 1
 
 
-def test_a_prediction_that_overflows_is_refused_at_its_step():
+def test_a_prediction_that_overflows_is_refused_at_its_step() -> None:
     model = EDMD.fit(Identity(1), [[1.0, 2.0]], [[10.0, 20.0]])
     assert np.isfinite(model.predict([[1.0]], 300)).all()
     with pytest.raises(KoopmanError, match="step 309 overflows"):
         model.predict([[1.0]], 400)
 
 
-def test_the_spectrum_composes_k_and_tells_when_k_is_defective():
+def test_the_spectrum_composes_k_and_tells_when_k_is_defective() -> None:
     k = np.random.default_rng(16).normal(size=(5, 5))
     found = spectrum(k)
     assert found.right @ np.diag(found.eigenvalues) @ found.left == pytest.approx(k.astype(complex), abs=1e-10)
@@ -331,7 +348,7 @@ def test_the_spectrum_composes_k_and_tells_when_k_is_defective():
     assert spectrum(np.array([[1.0, 1.0], [0.0, 1.0]])).condition_number > 1e8
 
 
-def test_an_eigenvalue_of_zero_decays_at_once_and_a_negative_one_flips():
+def test_an_eigenvalue_of_zero_decays_at_once_and_a_negative_one_flips() -> None:
     found = spectrum(np.diag([-1.0, 0.0])).continuous(0.5)
     assert found[0] == pytest.approx(2j * np.pi)
     assert found[1].real == -np.inf
@@ -384,6 +401,8 @@ GOOD = states(17)
     ],
 )
 @pytest.mark.filterwarnings("error")
-def test_data_and_settings_that_make_no_sense_are_refused_with_a_sentence(make, message):
+def test_data_and_settings_that_make_no_sense_are_refused_with_a_sentence(
+    make: Callable[[], object], message: str
+) -> None:
     with pytest.raises(KoopmanError, match=message):
         make()

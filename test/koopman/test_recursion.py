@@ -2,6 +2,8 @@
 
 import itertools
 import json
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,21 +21,21 @@ from robot_formation.koopman import (
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
-KINDS = {
+KINDS: dict[str, Callable[..., OnlineDMD | WindowedDMD]] = {
     "online": lambda dimension, **options: OnlineDMD(dimension, **options),
     "windowed": lambda dimension, **options: WindowedDMD(dimension, 8, **options),
 }
 
 
-def priors(rng, dimension, outputs):
+def priors(rng: np.random.Generator, dimension: int, outputs: int) -> tuple[Any, Any]:
     """No prior, one weight, or one for each component."""
-    weight = [0.0, 0.5, rng.uniform(0.1, 10.0, dimension)][rng.integers(3)]
+    weight: Any = [0.0, 0.5, rng.uniform(0.1, 10.0, dimension)][rng.integers(3)]
     return weight, rng.normal(size=(outputs, dimension)) if np.any(weight) else None
 
 
 @settings(deadline=None, max_examples=60)
 @given(dimension=st.integers(1, 6), forgetting=st.sampled_from([1.0, 0.98, 0.8]), seed=SEEDS)
-def test_online_dmd_equals_batch_least_squares_after_every_update(dimension, forgetting, seed):
+def test_online_dmd_equals_batch_least_squares_after_every_update(dimension: int, forgetting: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     outputs = int(rng.integers(1, 7))
     weight, k0 = priors(rng, dimension, outputs)
@@ -46,7 +48,9 @@ def test_online_dmd_equals_batch_least_squares_after_every_update(dimension, for
 
 @settings(deadline=None, max_examples=60)
 @given(dimension=st.integers(1, 6), forgetting=st.sampled_from([1.0, 0.98, 0.8]), seed=SEEDS)
-def test_windowed_dmd_equals_batch_least_squares_of_the_window_after_every_update(dimension, forgetting, seed):
+def test_windowed_dmd_equals_batch_least_squares_of_the_window_after_every_update(
+    dimension: int, forgetting: float, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     outputs, window = int(rng.integers(1, 7)), int(rng.integers(1, 3 * dimension + 2))
     weight, k0 = priors(rng, dimension, outputs)
@@ -59,7 +63,7 @@ def test_windowed_dmd_equals_batch_least_squares_of_the_window_after_every_updat
 
 @settings(deadline=None, max_examples=40)
 @given(kind=st.sampled_from(list(KINDS)), dimension=st.integers(2, 6), seed=SEEDS)
-def test_badly_conditioned_data_cost_no_digits_beyond_those_of_the_data(kind, dimension, seed):
+def test_badly_conditioned_data_cost_no_digits_beyond_those_of_the_data(kind: str, dimension: int, seed: int) -> None:
     # Components that differ a thousandfold, as raw displacements, constants and their squares do.
     rng = np.random.default_rng(seed)
     truth = rng.normal(size=(dimension, dimension))
@@ -73,7 +77,7 @@ def test_badly_conditioned_data_cost_no_digits_beyond_those_of_the_data(kind, di
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("forgetting", [1.0, 0.9])
-def test_ten_thousand_updates_leave_no_trace_of_rounding(kind, forgetting):
+def test_ten_thousand_updates_leave_no_trace_of_rounding(kind: str, forgetting: float) -> None:
     rng = np.random.default_rng(2)
     dmd = KINDS[kind](3, forgetting=forgetting)
     pairs = [(x, rng.normal(size=3)) for x in rng.normal(size=(10_000, 3))]
@@ -84,7 +88,7 @@ def test_ten_thousand_updates_leave_no_trace_of_rounding(kind, forgetting):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_p_and_the_condition_number_are_those_of_the_weighted_data_and_prior(kind):
+def test_p_and_the_condition_number_are_those_of_the_weighted_data_and_prior(kind: str) -> None:
     rng = np.random.default_rng(4)
     for spread in (1.0, 1e-3):  # the second one is fitted without P
         xs = rng.normal(size=(8, 3)) * [1.0, 1.0, spread]
@@ -98,7 +102,7 @@ def test_p_and_the_condition_number_are_those_of_the_weighted_data_and_prior(kin
         assert dmd.condition_number == pytest.approx(np.sqrt(np.linalg.cond(gram)), rel=1e-6)
 
 
-def test_with_a_prior_k_starts_there_and_moves_as_far_as_the_pair_weighs():
+def test_with_a_prior_k_starts_there_and_moves_as_far_as_the_pair_weighs() -> None:
     k0 = np.array([[0.5, 0.1], [0.0, 0.9]])
     for weight in (1e-6, 1.0, 1e6):
         dmd = OnlineDMD(2, prior_weight=weight, prior_k=k0)
@@ -110,12 +114,12 @@ def test_with_a_prior_k_starts_there_and_moves_as_far_as_the_pair_weighs():
         assert dmd.k == pytest.approx(k0 + np.outer(innovation, x) / (1.0 + weight), abs=1e-9)
 
 
-def test_the_default_prior_is_persistence():
+def test_the_default_prior_is_persistence() -> None:
     assert (OnlineDMD(3, prior_weight=1.0).k == np.eye(3)).all()
 
 
 @pytest.mark.parametrize("forgetting", [1.0, 0.9])
-def test_odmd_agrees_with_online_dmd(forgetting):
+def test_odmd_agrees_with_online_dmd(forgetting: float) -> None:
     odmd = pytest.importorskip("odmd")
     rng = np.random.default_rng(6)
     xs, ys = rng.normal(size=(2, 4, 60))
@@ -130,7 +134,7 @@ def test_odmd_agrees_with_online_dmd(forgetting):
 
 
 @pytest.mark.parametrize("forgetting", [1.0, 0.9])
-def test_odmd_agrees_with_windowed_dmd(forgetting):
+def test_odmd_agrees_with_windowed_dmd(forgetting: float) -> None:
     odmd = pytest.importorskip("odmd")
     rng = np.random.default_rng(7)
     xs, ys = rng.normal(size=(2, 4, 60))
@@ -145,7 +149,7 @@ def test_odmd_agrees_with_windowed_dmd(forgetting):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_lifted_pairs_give_the_koopman_operator_of_a_nonlinear_system(kind):
+def test_lifted_pairs_give_the_koopman_operator_of_a_nonlinear_system(kind: str) -> None:
     psi = Identity(2) + Monomials([(2, 0)])
     X = np.random.default_rng(8).uniform(-1, 1, (2, 30))
     dmd = KINDS[kind](psi.size)
@@ -156,7 +160,7 @@ def test_lifted_pairs_give_the_koopman_operator_of_a_nonlinear_system(kind):
     assert found.imag == pytest.approx(0.0, abs=1e-8)
 
 
-def test_a_window_forgets_what_it_does_not_hold():
+def test_a_window_forgets_what_it_does_not_hold() -> None:
     rng = np.random.default_rng(9)
     dmd = WindowedDMD(2, 10)
     for truth in (np.eye(2), -np.eye(2)):
@@ -181,7 +185,9 @@ HISTORIES = {
 @pytest.mark.parametrize("options", [{}, {"forgetting": 0.5}, {"prior_weight": 1e-4}], ids=str)
 @pytest.mark.parametrize("history", HISTORIES)
 @pytest.mark.filterwarnings("error")
-def test_any_finite_history_gives_a_finite_k_of_no_great_size(kind, options, history):
+def test_any_finite_history_gives_a_finite_k_of_no_great_size(
+    kind: str, options: dict[str, float], history: str
+) -> None:
     dmd = KINDS[kind](2, **options)
     for x in HISTORIES[history]:
         innovation = dmd.update(x, 0.9 * x)
@@ -206,7 +212,9 @@ def test_any_finite_history_gives_a_finite_k_of_no_great_size(kind, options, his
     ],
 )
 @pytest.mark.filterwarnings("error")
-def test_a_pair_that_makes_no_sense_is_refused_and_nothing_is_learned(kind, x, y, message):
+def test_a_pair_that_makes_no_sense_is_refused_and_nothing_is_learned(
+    kind: str, x: list[Any], y: list[float], message: str
+) -> None:
     dmd, twin = KINDS[kind](2), KINDS[kind](2)
     with pytest.raises(KoopmanError, match=message):
         dmd.update(x, y)
@@ -232,19 +240,19 @@ def test_a_pair_that_makes_no_sense_is_refused_and_nothing_is_learned(kind, x, y
     ],
 )
 @pytest.mark.parametrize("kind", KINDS)
-def test_settings_that_make_no_sense_are_refused(kind, options, message):
+def test_settings_that_make_no_sense_are_refused(kind: str, options: dict[str, Any], message: str) -> None:
     with pytest.raises(KoopmanError, match=message):
         KINDS[kind](2, **options)
 
 
-def test_an_empty_window_is_refused():
+def test_an_empty_window_is_refused() -> None:
     with pytest.raises(KoopmanError, match="at least one pair"):
         WindowedDMD(2, 0)
 
 
 @settings(deadline=None, max_examples=60)
 @given(kind=st.sampled_from(list(KINDS)), before=st.integers(0, 20), spread=st.sampled_from([1.0, 1e-4]), seed=SEEDS)
-def test_a_restored_state_goes_on_to_the_last_bit(kind, before, spread, seed):
+def test_a_restored_state_goes_on_to_the_last_bit(kind: str, before: int, spread: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     prior = {"prior_weight": 0.3, "prior_k": rng.normal(size=(2, 3))} if rng.random() < 0.5 else {}
     dmd = KINDS[kind](3, outputs=2, forgetting=0.9, **prior)
@@ -282,7 +290,7 @@ DAMAGE = [
 
 
 @pytest.mark.parametrize(("kind", "change", "message"), DAMAGE)
-def test_a_stored_state_that_was_damaged_is_refused(kind, change, message):
+def test_a_stored_state_that_was_damaged_is_refused(kind: str, change: dict[str, Any], message: str) -> None:
     dmd = KINDS[kind](2)
     for x in np.random.default_rng(3).normal(size=(12, 2)):
         dmd.update(x, x)
@@ -293,10 +301,11 @@ def test_a_stored_state_that_was_damaged_is_refused(kind, change, message):
             type(dmd).from_state({key: value for key, value in dmd.state().items() if key != name})
 
 
-def test_stored_states_whose_parts_do_not_fit_are_refused():
+def test_stored_states_whose_parts_do_not_fit_are_refused() -> None:
     online, windowed = OnlineDMD(2), WindowedDMD(2, 3)
     for dmd in (online, windowed):
         dmd.update([1.0, 2.0], [1.0, 2.0])
+    change: dict[str, Any]
     for change in ({"z": []}, {"kept": [3, 3]}, {"trace": -1.0}):
         with pytest.raises(KoopmanError, match="fit each other"):
             OnlineDMD.from_state({**online.state(), **change})
@@ -305,7 +314,7 @@ def test_stored_states_whose_parts_do_not_fit_are_refused():
             WindowedDMD.from_state({**windowed.state(), **change})
 
 
-def test_a_lower_bound_of_conditions_leaves_directions_out_that_only_noise_shows():
+def test_a_lower_bound_of_conditions_leaves_directions_out_that_only_noise_shows() -> None:
     rng = np.random.default_rng(11)
     direction = np.array([0.01, 0.05])
     xs = direction + rng.normal(0.0, 1e-4, (3, 2))

@@ -10,11 +10,11 @@ from robot_formation.leader.leader_motion import NOTHING, Leader, LeaderAction, 
 STEP = LeaderAction(move=Motion(x_m=0.05))
 
 
-def leader(timesteps=3, followers=("follower_1", "follower_2")):
+def leader(timesteps: int = 3, followers: tuple[str, ...] = ("follower_1", "follower_2")) -> Leader:
     return Leader(LeaderParameters(timesteps=timesteps, followers=followers))
 
 
-def test_a_tour_is_tick_0_then_a_step_and_a_tick_for_each_timestep_then_the_end():
+def test_a_tour_is_tick_0_then_a_step_and_a_tick_for_each_timestep_then_the_end() -> None:
     tour = leader(timesteps=3, followers=("follower_1",))
     found = [tour.start()]
     for timestep in range(3):
@@ -28,7 +28,7 @@ def test_a_tour_is_tick_0_then_a_step_and_a_tick_for_each_timestep_then_the_end(
 
 
 @pytest.mark.parametrize("order", [("follower_1", "follower_2"), ("follower_2", "follower_1")])
-def test_the_last_missing_follower_starts_the_step_whoever_it_is(order):
+def test_the_last_missing_follower_starts_the_step_whoever_it_is(order: tuple[str, str]) -> None:
     tour = leader()
     tour.start()
     assert tour.follower_done(order[0], 0) == NOTHING
@@ -36,7 +36,7 @@ def test_the_last_missing_follower_starts_the_step_whoever_it_is(order):
     assert tour.follower_done(order[1], 0) == STEP
 
 
-def test_no_step_begins_before_the_leader_stands():
+def test_no_step_begins_before_the_leader_stands() -> None:
     tour = leader(followers=("follower_1",))
     tour.start()
     assert tour.follower_done("follower_1", 0) == STEP
@@ -49,7 +49,7 @@ def test_no_step_begins_before_the_leader_stands():
     [("follower_1", 0), ("follower_1", 2), ("follower_1", 7), ("follower_3", 1), ("leader", 1)],
     ids=["a duplicate", "one that skips", "one far ahead", "a stranger's", "the leader's own"],
 )
-def test_a_tick_out_of_order_is_ignored(robot, tick):
+def test_a_tick_out_of_order_is_ignored(robot: str, tick: int) -> None:
     tour = leader(followers=("follower_1",))
     tour.start()
     tour.follower_done("follower_1", 0)
@@ -59,7 +59,7 @@ def test_a_tick_out_of_order_is_ignored(robot, tick):
     assert tour.follower_done("follower_1", 1) == STEP
 
 
-def test_a_moved_that_nobody_asked_for_is_no_tick():
+def test_a_moved_that_nobody_asked_for_is_no_tick() -> None:
     tour = leader()
     tour.start()
     assert tour.moved() == NOTHING
@@ -69,7 +69,7 @@ def test_a_moved_that_nobody_asked_for_is_no_tick():
     assert tour.moved() == NOTHING
 
 
-def test_paused_the_running_step_ends_but_no_new_one_begins_until_resume():
+def test_paused_the_running_step_ends_but_no_new_one_begins_until_resume() -> None:
     tour = leader(followers=("follower_1",))
     tour.start()
     tour.follower_done("follower_1", 0)
@@ -80,7 +80,7 @@ def test_paused_the_running_step_ends_but_no_new_one_begins_until_resume():
     assert tour.timestep == 2
 
 
-def test_resume_without_a_reason_starts_nothing():
+def test_resume_without_a_reason_starts_nothing() -> None:
     tour = leader()
     tour.start()
     assert tour.resume() == NOTHING
@@ -88,7 +88,7 @@ def test_resume_without_a_reason_starts_nothing():
     assert tour.resume() == NOTHING
 
 
-def test_paused_before_the_end_the_tour_ends_on_resume():
+def test_paused_before_the_end_the_tour_ends_on_resume() -> None:
     tour = leader(timesteps=1, followers=("follower_1",))
     tour.start()
     tour.follower_done("follower_1", 0)
@@ -98,7 +98,7 @@ def test_paused_before_the_end_the_tour_ends_on_resume():
     assert tour.resume() == LeaderAction(finished=True)
 
 
-def test_after_the_end_nothing_happens_any_more():
+def test_after_the_end_nothing_happens_any_more() -> None:
     tour = leader(timesteps=1, followers=("follower_1",))
     tour.start()
     tour.follower_done("follower_1", 0)
@@ -109,7 +109,7 @@ def test_after_the_end_nothing_happens_any_more():
     assert tour.resume() == NOTHING
 
 
-def test_an_empty_formation_never_keeps_the_leader_waiting():
+def test_an_empty_formation_never_keeps_the_leader_waiting() -> None:
     assert list(leader(followers=()).waiting_for) == []
 
 
@@ -122,7 +122,9 @@ def test_an_empty_formation_never_keeps_the_leader_waiting():
         max_size=60,
     )
 )
-def test_whatever_comes_ticks_rise_by_one_and_every_step_is_followed_by_its_tick(events):
+def test_whatever_comes_ticks_rise_by_one_and_every_step_is_followed_by_its_tick(
+    events: list[str | tuple[str, int]],
+) -> None:
     tour = leader(timesteps=3)
     ticks = [tour.start().done]
     steps = 0
@@ -136,6 +138,7 @@ def test_whatever_comes_ticks_rise_by_one_and_every_step_is_followed_by_its_tick
         steps += action.move is not None
         if action.done is not None:
             ticks.append(action.done)
+        assert ticks[-1] is not None
         assert steps - 1 <= ticks[-1] <= steps
     assert ticks == list(range(len(ticks)))
     assert len(ticks) <= 4

@@ -2,6 +2,7 @@
 
 import contextlib
 import socket
+from pathlib import Path
 
 import pytest
 
@@ -13,24 +14,24 @@ UNUSED = range(228, 232)
 
 
 @pytest.fixture(autouse=True)
-def _own_domains(monkeypatch):
+def _own_domains(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ros_domain, "DOMAINS", UNUSED)
 
 
-def test_reservations_that_start_at_one_place_get_different_domains():
+def test_reservations_that_start_at_one_place_get_different_domains() -> None:
     with DomainReservation(5) as first, DomainReservation(5) as second, DomainReservation(5) as third:
         assert len({first, second, third}) == 3
         assert {first, second, third} <= set(UNUSED)
 
 
-def test_a_domain_is_free_again_after_its_reservation():
+def test_a_domain_is_free_again_after_its_reservation() -> None:
     with DomainReservation(5) as before:
         pass
     with DomainReservation(5) as after:
         assert after == before
 
 
-def test_when_every_domain_is_taken_one_clear_line_says_so():
+def test_when_every_domain_is_taken_one_clear_line_says_so() -> None:
     with contextlib.ExitStack() as taken:
         assert {taken.enter_context(DomainReservation(7)) for _ in UNUSED} == set(UNUSED)
         with pytest.raises(DomainError, match="no ROS domain from 228 to 231 is free"):
@@ -38,22 +39,22 @@ def test_when_every_domain_is_taken_one_clear_line_says_so():
     assert free_domain() in UNUSED
 
 
-def test_a_domain_whose_ports_are_used_is_passed_over():
+def test_a_domain_whose_ports_are_used_is_passed_over() -> None:
     wanted = free_domain()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as foreign:
         foreign.bind(("127.0.0.1", domain_ports(wanted)[10]))
         assert free_domain() != wanted
 
 
-def test_ports_of_neighbouring_domains_do_not_overlap():
+def test_ports_of_neighbouring_domains_do_not_overlap() -> None:
     assert domain_ports(0)[0] == 7400
     assert all(domain_ports(n)[-1] + 1 == domain_ports(n + 1)[0] for n in DOMAINS)
     assert domain_ports(DOMAINS[-1])[0] < 32768  # below the ports that Linux hands out
 
 
-def test_unreadable_tables_of_ports_do_not_stop_a_run(monkeypatch):
-    def refuse(*_arguments, **_keywords):
+def test_unreadable_tables_of_ports_do_not_stop_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_arguments: object, **_keywords: object) -> None:
         raise PermissionError
 
-    monkeypatch.setattr(ros_domain.Path, "read_text", refuse)
+    monkeypatch.setattr(Path, "read_text", refuse)
     assert free_domain() in UNUSED

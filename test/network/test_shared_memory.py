@@ -6,6 +6,7 @@ import mmap
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -23,25 +24,25 @@ rclpy.spin(node)
 SEGMENT = "fastrtps_0123456789abcdef"
 
 
-def make(folder, *names):
+def make(folder: Path, *names: str) -> None:
     for name in names:
         (folder / name).touch()
 
 
-def lock(path):
+def lock(path: Path) -> int:
     descriptor = os.open(path, os.O_RDONLY)
     fcntl.flock(descriptor, fcntl.LOCK_EX)
     return descriptor
 
 
-def test_files_without_a_living_owner_are_removed(tmp_path):
+def test_files_without_a_living_owner_are_removed(tmp_path: Path) -> None:
     names = {SEGMENT, f"{SEGMENT}_el", "fastrtps_port7413", "fastrtps_port7413_sl", "sem.fastrtps_port7413_mutex"}
     make(tmp_path, *names)
     assert set(clean_orphans(folder=tmp_path)) == names
     assert not list(tmp_path.iterdir())
 
 
-def test_files_whose_owner_lives_stay(tmp_path):
+def test_files_whose_owner_lives_stay(tmp_path: Path) -> None:
     make(tmp_path, SEGMENT, f"{SEGMENT}_el", "fastrtps_port7413", "fastrtps_port7413_el", "sem.fastrtps_port7413_mutex")
     descriptor = lock(tmp_path / "fastrtps_port7413_el")
     try:
@@ -52,7 +53,7 @@ def test_files_whose_owner_lives_stay(tmp_path):
     assert len(list(tmp_path.iterdir())) == 3
 
 
-def test_a_port_that_several_share_stays_while_one_of_them_lives(tmp_path):
+def test_a_port_that_several_share_stays_while_one_of_them_lives(tmp_path: Path) -> None:
     make(tmp_path, "fastrtps_port7400", "fastrtps_port7400_sl")
     descriptor = os.open(tmp_path / "fastrtps_port7400_sl", os.O_RDONLY)
     fcntl.flock(descriptor, fcntl.LOCK_SH)
@@ -62,14 +63,14 @@ def test_a_port_that_several_share_stays_while_one_of_them_lives(tmp_path):
         os.close(descriptor)
 
 
-def test_a_lock_file_that_is_open_but_not_yet_locked_counts_as_alive(tmp_path):
+def test_a_lock_file_that_is_open_but_not_yet_locked_counts_as_alive(tmp_path: Path) -> None:
     make(tmp_path, SEGMENT, f"{SEGMENT}_el")
     with open(tmp_path / f"{SEGMENT}_el"):
         assert clean_orphans(folder=tmp_path) == []
     assert clean_orphans(folder=tmp_path) == [SEGMENT, f"{SEGMENT}_el"]
 
 
-def test_a_port_without_lock_file_is_removed_unless_somebody_has_it_mapped(tmp_path):
+def test_a_port_without_lock_file_is_removed_unless_somebody_has_it_mapped(tmp_path: Path) -> None:
     port = "fastrtps_port7413"
     make(tmp_path, port)
     (tmp_path / port).write_bytes(b"x")
@@ -79,36 +80,37 @@ def test_a_port_without_lock_file_is_removed_unless_somebody_has_it_mapped(tmp_p
     assert clean_orphans(folder=tmp_path) == [port]
 
 
-def test_foreign_files_stay(tmp_path):
+def test_foreign_files_stay(tmp_path: Path) -> None:
     make(tmp_path, "fastrtps_port", "fastrtps_xyz_el", "somebody_elses", "lttng")
     assert clean_orphans(folder=tmp_path) == []
     assert len(list(tmp_path.iterdir())) == 4
 
 
-def test_cleaning_one_domain_leaves_the_ports_of_others(tmp_path):
+def test_cleaning_one_domain_leaves_the_ports_of_others(tmp_path: Path) -> None:
     ports = {"mine": 7400 + 250 * 3 + 11, "other": 7400 + 250 * 4, "any": 7000}
     make(tmp_path, *(f"fastrtps_port{port}_el" for port in ports.values()))
     assert set(clean_orphans(3, tmp_path)) == {f"fastrtps_port{ports['mine']}_el", f"fastrtps_port{ports['any']}_el"}
 
 
-def test_a_missing_folder_is_no_error(tmp_path):
+def test_a_missing_folder_is_no_error(tmp_path: Path) -> None:
     assert clean_orphans(folder=tmp_path / "nowhere") == []
 
 
 @pytest.mark.graph
 @pytest.mark.xdist_group("experiment_shared_memory")
-def test_a_killed_node_leaves_files_that_are_removed_and_a_living_one_keeps_its_own():
+def test_a_killed_node_leaves_files_that_are_removed_and_a_living_one_keeps_its_own() -> None:
     if importlib.util.find_spec("rclpy") is None:
         pytest.skip("ROS is not installed")
     with DomainReservation() as domain:
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
-        def start():
+        def start() -> subprocess.Popen[bytes]:
             node = subprocess.Popen([sys.executable, "-c", NODE], env=environment, stdout=subprocess.PIPE)
+            assert node.stdout is not None
             assert node.stdout.readline() == b"up\n"
             return node
 
-        def files_of(node):
+        def files_of(node: subprocess.Popen[bytes]) -> set[str]:
             opened = {os.path.realpath(entry) for entry in os.scandir(f"/proc/{node.pid}/fd")}
             groups = {path.removeprefix("/dev/shm/").removesuffix("_el") for path in opened if path.endswith("_el")}
             return {name for group, names in fast_dds_files().items() if group in groups for name in names}
@@ -133,5 +135,5 @@ def test_a_killed_node_leaves_files_that_are_removed_and_a_living_one_keeps_its_
             for node in (living, doomed):
                 node.kill()
                 node.wait()
-                node.stdout.close()
+                node.communicate()
             clean_orphans(domain)

@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -13,11 +15,11 @@ from robot_formation.network import shared_memory_space
 from robot_formation.network.shared_memory_space import SharedMemoryError, require_space
 
 
-def file_system(free, flags=0, size=64 << 20):
+def file_system(free: int, flags: int = 0, size: int = 64 << 20) -> Callable[[object], SimpleNamespace]:
     return lambda folder: SimpleNamespace(f_bavail=free // 4096, f_frsize=4096, f_blocks=size // 4096, f_flag=flags)
 
 
-def test_a_full_one_is_refused_with_what_to_do(tmp_path):
+def test_a_full_one_is_refused_with_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(SharedMemoryError) as error:
         require_space(tmp_path, file_system(4096))
     assert str(tmp_path) in str(error.value)
@@ -27,25 +29,29 @@ def test_a_full_one_is_refused_with_what_to_do(tmp_path):
 
 
 @pytest.mark.parametrize("state", [file_system(64 << 10, size=64 << 10), file_system(0, os.ST_RDONLY)])
-def test_a_small_one_and_a_read_only_one_will_do(tmp_path, state):
+def test_a_small_one_and_a_read_only_one_will_do(tmp_path: Path, state: Callable[[object], SimpleNamespace]) -> None:
     require_space(tmp_path, state)
 
 
-def test_none_at_all_will_do(tmp_path):
+def test_none_at_all_will_do(tmp_path: Path) -> None:
     require_space(tmp_path / "missing")
 
 
-def full(folder=None, statvfs=None):
+def full(folder: object = None, statvfs: object = None) -> None:
     raise SharedMemoryError("/dev/shm is full")
 
 
 @pytest.mark.parametrize("arguments", [("record", "-a"), ("play", "bag")])
-def test_verbs_that_load_ros_say_it_in_one_line(capsys, monkeypatch, arguments):
+def test_verbs_that_load_ros_say_it_in_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, str]
+) -> None:
     monkeypatch.setattr(shared_memory_space, "require_space", full)
     assert "/dev/shm is full" in complaint(capsys, *arguments)
 
 
-def test_the_doctor_names_it_and_does_not_load_ros(capsys, monkeypatch):
+def test_the_doctor_names_it_and_does_not_load_ros(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("robot_formation.cli.doctor.require_space", full)
     assert main(["doctor"]) == 2
     assert "a run cannot start: /dev/shm is full" in capsys.readouterr().err
@@ -59,7 +65,7 @@ def test_the_doctor_names_it_and_does_not_load_ros(capsys, monkeypatch):
         (["-m", "robot_formation.nodes", "leader"], 2),
     ],
 )
-def test_processes_end_by_it_before_ros_is_loaded(tmp_path, command, code):
+def test_processes_end_by_it_before_ros_is_loaded(tmp_path: Path, command: list[str], code: int) -> None:
     # The check is made to fail where Python starts, since filling /dev/shm would hit everybody.
     (tmp_path / "sitecustomize.py").write_text(
         "from robot_formation.network import shared_memory_space as space\nspace.LEAST_FREE_BYTES = 1 << 62\n"

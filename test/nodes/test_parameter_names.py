@@ -12,7 +12,7 @@ from robot_formation.nodes.recorder.recorder_node import RecorderParameters
 from robot_formation.parameters import specs
 
 OF_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides./topic.subscription.reliability")
-NODES = {
+NODES: dict[str, tuple[type, ...]] = {
     **{kind: (entry.parameter_class(), HostParameters) for kind, entry in KINDS.items()},
     "recorder": (RecorderParameters, HostParameters),
     "player": (PlayerParameters,),

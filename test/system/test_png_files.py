@@ -4,6 +4,7 @@ import io
 import os
 import struct
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,10 +18,10 @@ from robot_formation.vision.pixy2.picture import PictureError
 from robot_formation.vision.pixy2.picture_files import read_picture
 
 
-def png(width, height, depth, colour, data):
+def png(width: int, height: int, depth: int, colour: int, data: bytes) -> bytes:
     """A PNG file of these numbers and pixels, which need not fit."""
 
-    def chunk(kind, content):
+    def chunk(kind: bytes, content: bytes) -> bytes:
         return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
     head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, depth, colour, 0, 0, 0))
@@ -30,24 +31,26 @@ def png(width, height, depth, colour, data):
 GOOD = png(8, 8, 16, 0, (b"\0" + bytes(range(16))) * 8)
 
 
-def silent(text):
+def silent(text: str) -> None:
     """Take no notice of warnings."""
 
 
-def test_a_png_file_tells_its_size_and_whether_it_is_whole():
+def test_a_png_file_tells_its_size_and_whether_it_is_whole() -> None:
     assert png_head(GOOD) == (8, 8, 16, 0)
     assert is_whole(GOOD)
     assert not is_whole(GOOD[:-1])
     assert not is_whole(GOOD[:45] + b"x" + GOOD[46:])
     assert png_head(GOOD[:20]) is None
     assert png_head(b"BM" + GOOD) is None
-    assert unpacks_within(GOOD, png_head(GOOD).data_bytes)
+    head = png_head(GOOD)
+    assert head is not None
+    assert unpacks_within(GOOD, head.data_bytes)
     assert unpacks_within(GOOD, 136)
     assert not unpacks_within(GOOD, 135)
 
 
 @pytest.mark.parametrize(("depth", "colour"), [(8, 2), (16, 0), (1, 0), (8, 6), (8, 3)])
-def test_the_bound_of_a_pngs_pixels_holds_for_real_ones_interlaced_too(depth, colour):
+def test_the_bound_of_a_pngs_pixels_holds_for_real_ones_interlaced_too(depth: int, colour: int) -> None:
     # Adam7's passes of a 9 x 7 picture, each row with a byte of its filter.
     samples = {0: 1, 2: 3, 3: 1, 6: 4}[colour]
     passes = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
@@ -55,7 +58,9 @@ def test_the_bound_of_a_pngs_pixels_holds_for_real_ones_interlaced_too(depth, co
     for x, y, step_x, step_y in passes:
         columns, rows = len(range(x, 900, step_x)), len(range(y, 700, step_y))
         total += rows * ((columns * depth * samples + 7) // 8 + 1) if columns else 0
-    assert png_head(png(900, 700, depth, colour, b"")).data_bytes >= total
+    head = png_head(png(900, 700, depth, colour, b""))
+    assert head is not None
+    assert head.data_bytes >= total
 
 
 @pytest.mark.parametrize(
@@ -71,14 +76,14 @@ def test_the_bound_of_a_pngs_pixels_holds_for_real_ones_interlaced_too(depth, co
         ("a.npy", b"", "neither a PNG nor a usable NPY file"),
     ],
 )
-def test_height_maps_are_refused_before_they_are_decoded(tmp_path, name, content, said):
+def test_height_maps_are_refused_before_they_are_decoded(tmp_path: Path, name: str, content: bytes, said: str) -> None:
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(ParameterError, match=said):
         read_heights(path)
 
 
-def test_every_cut_of_a_height_map_is_refused_in_one_line(tmp_path):
+def test_every_cut_of_a_height_map_is_refused_in_one_line(tmp_path: Path) -> None:
     stream = io.BytesIO()
     np.save(stream, np.ones((4, 4)))
     for content in (stream.getvalue(), GOOD):
@@ -91,7 +96,7 @@ def test_every_cut_of_a_height_map_is_refused_in_one_line(tmp_path):
 
 
 @pytest.mark.parametrize("version", [(1, 0), (2, 0), (3, 0)])
-def test_height_maps_of_all_versions_of_npy_are_read(tmp_path, version):
+def test_height_maps_of_all_versions_of_npy_are_read(tmp_path: Path, version: tuple[int, int]) -> None:
     values = np.arange(16.0).reshape(4, 4)
     with (tmp_path / "heights.npy").open("wb") as file:
         np.lib.format.write_array(file, values, version)
@@ -110,25 +115,25 @@ def test_height_maps_of_all_versions_of_npy_are_read(tmp_path, version):
         (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n", "no image that can be read"),
     ],
 )
-def test_pictures_are_refused_before_they_are_decoded(tmp_path, content, said):
+def test_pictures_are_refused_before_they_are_decoded(tmp_path: Path, content: bytes, said: str) -> None:
     path = tmp_path / "picture.png"
     path.write_bytes(content)
     with pytest.raises(PictureError, match=said):
         read_picture(path, silent)
 
 
-def test_pipes_and_devices_are_no_pictures_height_maps_or_logs(tmp_path):
+def test_pipes_and_devices_are_no_pictures_height_maps_or_logs(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    for path, said in ((tmp_path / "pipe", "Is a named pipe"), ("/dev/zero", "Is a device")):
+    for path, said in ((tmp_path / "pipe", "Is a named pipe"), (Path("/dev/zero"), "Is a device")):
         with pytest.raises(PictureError, match=said):
             read_picture(path, silent)
         with pytest.raises(ParameterError, match=said):
-            read_heights(path if path != "/dev/zero" else tmp_path.__class__(path))
+            read_heights(path)
         with pytest.raises(AnalysisError, match=said):
             read_log(path)
 
 
-def test_logs_are_bounded_in_rows_and_in_the_length_of_a_line(tmp_path, monkeypatch):
+def test_logs_are_bounded_in_rows_and_in_the_length_of_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "log.csv"
     path.write_text("u_m,v_m\n" + "0.0,0.05\n" * 20)
     assert len(read_log(path)) == 20

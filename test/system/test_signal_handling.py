@@ -3,6 +3,9 @@
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from signal import Signals
+from typing import Any
 
 import pytest
 
@@ -19,19 +22,19 @@ print(hung_up, stopped())
 """
 
 
-def ignore_hangup():
+def ignore_hangup() -> None:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
 
 @pytest.fixture
-def handlers():
+def handlers() -> Iterator[dict[Signals, Any]]:
     before = {number: signal.getsignal(number) for number in ENDING}
     yield before
     for number, handler in before.items():
         signal.signal(number, handler)
 
 
-def test_the_handlers_before_come_back(handlers):
+def test_the_handlers_before_come_back(handlers: dict[Signals, Any]) -> None:
     came = []
     previous = take(lambda number, frame: came.append(number))
     for number in ENDING:
@@ -41,7 +44,7 @@ def test_the_handlers_before_come_back(handlers):
     assert {number: signal.getsignal(number) for number in ENDING} == handlers
 
 
-def test_an_ignored_hangup_stays_ignored(handlers):
+def test_an_ignored_hangup_stays_ignored(handlers: dict[Signals, Any]) -> None:
     ignore_hangup()
     came = []
     previous = take(lambda number, frame: came.append(number))
@@ -52,7 +55,7 @@ def test_an_ignored_hangup_stays_ignored(handlers):
 
 
 @pytest.mark.parametrize("ignored", [True, False])
-def test_a_hangup_is_counted_unless_it_is_ignored(handlers, ignored):
+def test_a_hangup_is_counted_unless_it_is_ignored(handlers: dict[Signals, Any], ignored: bool) -> None:
     if ignored:
         ignore_hangup()
     with SignalCounter() as signals:
@@ -61,7 +64,7 @@ def test_a_hangup_is_counted_unless_it_is_ignored(handlers, ignored):
         assert signals.came() is not ignored
 
 
-def test_signals_beyond_the_patience_interrupt(handlers):
+def test_signals_beyond_the_patience_interrupt(handlers: dict[Signals, Any]) -> None:
     with SignalCounter() as signals:
         for _ in range(3):
             signal.raise_signal(signal.SIGINT)
@@ -75,7 +78,7 @@ def test_signals_beyond_the_patience_interrupt(handlers):
 
 
 @pytest.mark.parametrize(("ignored", "printed"), [(True, "False True"), (False, "True True")])
-def test_a_node_counts_a_hangup_unless_it_is_ignored(ignored, printed):
+def test_a_node_counts_a_hangup_unless_it_is_ignored(ignored: bool, printed: str) -> None:
     completed = subprocess.run(
         [sys.executable, "-c", NODE],
         preexec_fn=ignore_hangup if ignored else None,

@@ -3,11 +3,16 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
 
 from robot_formation.system.standard_error import diverted_stderr, silent_stderr
 
 
-def test_what_is_printed_below_python_goes_into_the_file_and_then_to_the_terminal_again(capfd, tmp_path):
+def test_what_is_printed_below_python_goes_into_the_file_and_then_to_the_terminal_again(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     path = tmp_path / "printed"
     with path.open("w") as file, diverted_stderr(file):
         os.write(2, b"inside")
@@ -16,7 +21,7 @@ def test_what_is_printed_below_python_goes_into_the_file_and_then_to_the_termina
     assert capfd.readouterr().err == "behind"
 
 
-def test_nothing_comes_out_of_silence_and_an_error_ends_it(capfd):
+def test_nothing_comes_out_of_silence_and_an_error_ends_it(capfd: pytest.CaptureFixture[str]) -> None:
     try:
         with silent_stderr():
             os.write(2, b"inside")
@@ -26,7 +31,7 @@ def test_nothing_comes_out_of_silence_and_an_error_ends_it(capfd):
     assert capfd.readouterr().err == "behind"
 
 
-def test_a_closed_descriptor_stays_closed():
+def test_a_closed_descriptor_stays_closed() -> None:
     code = "from robot_formation.system.standard_error import silent_stderr as s\nwith s(): pass\nimport os\n"
     code += "try:\n    os.fstat(2)\nexcept OSError:\n    print('closed')\n"
     command = [sys.executable, "-c", code]

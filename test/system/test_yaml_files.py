@@ -2,6 +2,8 @@
 
 import contextlib
 import os
+from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -47,7 +49,7 @@ class RefusedError(FormationError):
         ("a" * (2 << 20), "more than 1048576 characters", None),
     ],
 )
-def test_what_is_wrong_is_told_with_its_line(text, problem, line):
+def test_what_is_wrong_is_told_with_its_line(text: str, problem: str, line: int) -> None:
     with pytest.raises(YamlError) as raised:
         parse_yaml(text)
     assert problem in raised.value.problem
@@ -59,18 +61,18 @@ def test_what_is_wrong_is_told_with_its_line(text, problem, line):
     "text",
     ["", "1", "a: [1, 2.5, x]", "a: &x [1]\nb: *x", "b: &b {a: 1}\nd: &d {<<: *b, a: 2}\ne: {<<: *d}", '{"a": [1]}'],
 )
-def test_plain_yaml_is_read_as_it_always_was(text):
+def test_plain_yaml_is_read_as_it_always_was(text: str) -> None:
     assert parse_yaml(text) == parse_yaml(text.encode()) == yaml.safe_load(text)
 
 
 @given(st.text(alphabet="ab01.:-_*&!<>{}[],'\"\n |%@?#~", max_size=40))
-def test_no_text_ends_in_another_error(text):
+def test_no_text_ends_in_another_error(text: str) -> None:
     with contextlib.suppress(YamlError):
         parse_yaml(text)
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder", "missing", "large"])
-def test_only_files_are_read(tmp_path, kind):
+def test_only_files_are_read(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "file"
     if kind == "pipe":
         os.mkfifo(path)
@@ -78,7 +80,8 @@ def test_only_files_are_read(tmp_path, kind):
         path.mkdir()
     elif kind == "large":
         path.write_bytes(b" " * (2 << 20))
-    path = "/dev/zero" if kind == "device" else path
+    elif kind == "device":
+        path = Path("/dev/zero")
     said = {
         "pipe": "Is a named pipe",
         "device": "Is a device",
@@ -90,7 +93,7 @@ def test_only_files_are_read(tmp_path, kind):
         read_yaml(path, refuse=RefusedError, remedy="make one")
 
 
-def test_a_file_is_read_up_to_its_bound(tmp_path):
+def test_a_file_is_read_up_to_its_bound(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"12345678")
     assert read_file(tmp_path / "file", 8) == b"12345678"
     with pytest.raises(OSError, match="larger than 7 B"):
@@ -113,7 +116,7 @@ def test_a_file_is_read_up_to_its_bound(tmp_path):
         f"predictor.{'z' * 40_000}=1",
     ],
 )
-def test_settings_of_any_kind_are_refused_in_a_short_line(setting):
+def test_settings_of_any_kind_are_refused_in_a_short_line(setting: str) -> None:
     with pytest.raises(FormationError) as raised:
         override(load_track("one"), [setting])
     assert len(str(raised.value)) <= MOST_CHARACTERS
@@ -131,7 +134,7 @@ def test_settings_of_any_kind_are_refused_in_a_short_line(setting):
         ('predictor: {"for\\e[31m\\ngetting": 1}\n', "no parameter 'for\\x1b[31m getting'"),
     ],
 )
-def test_a_scenario_is_refused_with_its_name_and_line(tmp_path, text, said):
+def test_a_scenario_is_refused_with_its_name_and_line(tmp_path: Path, text: str, said: str) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     with pytest.raises(FormationError) as raised:
@@ -140,11 +143,11 @@ def test_a_scenario_is_refused_with_its_name_and_line(tmp_path, text, said):
     assert said in str(raised.value)
 
 
-def test_values_are_shown_short_whatever_they_are():
-    inner = [1]
+def test_values_are_shown_short_whatever_they_are() -> None:
+    inner: list[Any] = [1]
     for _ in range(50):
         inner = [inner] * 9
-    recursive = {}
+    recursive: dict[str, Any] = {}
     recursive["a"] = recursive
     values = [inner, recursive, "x" * 10_000, b"x" * 10_000, 10**10_000, dict.fromkeys(range(1000), "y" * 50), None]
     assert all(len(shown(value)) <= 80 for value in values)
@@ -153,19 +156,19 @@ def test_values_are_shown_short_whatever_they_are():
     assert shown(["a", 1]) == "['a', 1]"
 
 
-def test_a_long_message_keeps_its_beginning_and_its_remedy():
+def test_a_long_message_keeps_its_beginning_and_its_remedy() -> None:
     text = str(FormationError("file.yaml: " + "x" * 5000 + "; correct the file"))
     assert len(text) == MOST_CHARACTERS
     assert text.startswith("file.yaml: ")
     assert text.endswith("; correct the file")
 
 
-def test_a_line_of_a_table_without_its_end_was_cut_off(tmp_path):
+def test_a_line_of_a_table_without_its_end_was_cut_off(tmp_path: Path) -> None:
     (tmp_path / "t.csv").write_bytes(b"a,b\r\n1,2\n3")
     assert list(whole_lines(tmp_path / "t.csv")) == ["a,b\r\n", "1,2\n"]
 
 
-def test_a_table_of_one_endless_line_is_refused_before_it_is_read(tmp_path):
+def test_a_table_of_one_endless_line_is_refused_before_it_is_read(tmp_path: Path) -> None:
     with (tmp_path / "t.csv").open("wb") as file:
         file.truncate(1 << 40)
     with pytest.raises(ValueError, match="more than 20000 characters"):

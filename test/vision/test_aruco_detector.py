@@ -1,14 +1,16 @@
 """Tags: found where they are on drawn and on rendered pictures, and nowhere else."""
 
 import math
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot_formation.surface import make_surface
+from robot_formation.surface import Surface, make_surface
 from robot_formation.vision import aruco_patterns
 from robot_formation.vision.aruco_detector import TagDetector, TagParameters
 from robot_formation.vision.aruco_patterns import MODULES, QUIET_MODULES, TagError, pattern
@@ -38,7 +40,13 @@ CORNERS = {
 }
 
 
-def drawn(face, corners, background=GREY, light=210, dark=20):
+def drawn(
+    face: Face,
+    corners: Sequence[tuple[int, int]] | npt.NDArray[np.float64] | npt.NDArray[np.int64],
+    background: npt.NDArray[np.uint8] = GREY,
+    light: int = 210,
+    dark: int = 20,
+) -> npt.NDArray[np.uint8]:
     """A tag of known outline (4, 2), drawn by warping it, eight samples per pixel and way."""
     modules = np.pad(pattern(face), QUIET_MODULES, constant_values=True)
     texture = np.kron(np.where(modules, light, dark), np.ones((32, 32))).astype(np.uint8)
@@ -54,7 +62,9 @@ def drawn(face, corners, background=GREY, light=210, dark=20):
     return np.repeat(cv2.resize(large, (316, 208), interpolation=cv2.INTER_AREA)[..., None], 3, axis=2)
 
 
-def rendered(ahead_m, aside_m, yaw_rad, surface=PLANE, seed=0):
+def rendered(
+    ahead_m: float, aside_m: float, yaw_rad: float, surface: Surface = PLANE, seed: int = 0
+) -> tuple[npt.NDArray[np.uint8], dict[Face, npt.NDArray[np.float64]]]:
     """A picture of a neighbour so far ahead and to the left, turned so far, and its faces' true outlines."""
     camera = Camera(surface, WORLD)
     looking = pose_on_surface(surface, 0.89, 0.5, 0.0)
@@ -70,14 +80,14 @@ def rendered(ahead_m, aside_m, yaw_rad, surface=PLANE, seed=0):
     return picture, outlines
 
 
-def one(detector, picture):
+def one(detector: TagDetector, picture: npt.NDArray[np.uint8]) -> tuple[Face, npt.NDArray[np.float32]]:
     ((face, corners),) = detector.faces(picture)
     return face, corners
 
 
 @pytest.mark.parametrize("face", Face)
 @pytest.mark.parametrize("side", [22, 50, 90])
-def test_a_drawn_tag_is_found_with_its_corners_in_order(face, side):
+def test_a_drawn_tag_is_found_with_its_corners_in_order(face: Face, side: int) -> None:
     truth = np.array([(100.3, 60.6), (100.3 + side, 60.6), (100.3 + side, 60.6 + side), (100.3, 60.6 + side)])
     found, corners = one(DETECTOR, drawn(face, truth))
     assert found == face
@@ -94,7 +104,9 @@ def test_a_drawn_tag_is_found_with_its_corners_in_order(face, side):
     top=st.floats(12, 100),
     face=st.sampled_from(list(Face)),
 )
-def test_a_tag_seen_obliquely_is_reported_as_its_bounding_box(side, squeeze, slant, left, top, face):
+def test_a_tag_seen_obliquely_is_reported_as_its_bounding_box(
+    side: float, squeeze: float, slant: float, left: float, top: float, face: Face
+) -> None:
     right, shear = left + squeeze * side, slant * side
     truth = np.array([(left, top), (right, top + shear), (right, top + side - shear), (left, top + side)])
     (box,) = DETECTOR.detect(drawn(face, truth))
@@ -110,21 +122,23 @@ def test_a_tag_seen_obliquely_is_reported_as_its_bounding_box(side, squeeze, sla
     ("ahead", "aside", "yaw"),
     [(0.0, 0.26, 0.0), (0.0, 0.32, 0.0), (0.05, 0.4, 0.4), (-0.1, 0.5, -0.5), (0.0, 0.6, 0.2)],
 )
-def test_the_target_face_is_found_where_a_pinhole_puts_its_corners(surface, ahead, aside, yaw):
+def test_the_target_face_is_found_where_a_pinhole_puts_its_corners(
+    surface: Surface, ahead: float, aside: float, yaw: float
+) -> None:
     picture, outlines = rendered(ahead, aside, yaw, surface)
     found = dict(DETECTOR.faces(picture))
     np.testing.assert_allclose(found[Face.TARGET], outlines[Face.TARGET], atol=1.2)
 
 
 @pytest.mark.parametrize(("yaw", "beside"), [(-0.8, Face.FRONT), (0.8, Face.REAR)])
-def test_two_faces_in_view_are_two_blocks(yaw, beside):
+def test_two_faces_in_view_are_two_blocks(yaw: float, beside: Face) -> None:
     picture, outlines = rendered(0.0, 0.35, yaw)
     found = dict(DETECTOR.faces(picture))
     assert set(found) == {Face.TARGET, beside}
     np.testing.assert_allclose(found[beside], outlines[beside], atol=1.5)
 
 
-def test_edges_have_no_bias_worth_correcting():
+def test_edges_have_no_bias_worth_correcting() -> None:
     errors = []
     for number in range(24):
         picture, outlines = rendered(
@@ -137,25 +151,25 @@ def test_edges_have_no_bias_worth_correcting():
 
 
 @pytest.mark.parametrize("aside", np.linspace(0.26, 0.6, 8))
-def test_a_face_that_is_turned_by_up_to_45_degrees_is_found_in_every_picture(aside):
+def test_a_face_that_is_turned_by_up_to_45_degrees_is_found_in_every_picture(aside: float) -> None:
     for number, yaw in enumerate(np.radians([-45, -25, 0, 25, 45])):
         picture, _ = rendered(0.0, aside, float(yaw), seed=number)
         assert Face.TARGET in dict(DETECTOR.faces(picture))
 
 
-def noise(number):
+def noise(number: int) -> npt.NDArray[np.uint8]:
     """Noise of grains from one pixel up."""
     grain = 1 + number % 6
     grains = np.random.default_rng(number).integers(0, 256, (208 // grain + 1, 316 // grain + 1, 3), dtype=np.uint8)
     return np.kron(grains, np.ones((grain, grain, 1), np.uint8))[:208, :316]
 
 
-def test_there_is_nothing_in_black_white_grey_and_noise():
+def test_there_is_nothing_in_black_white_grey_and_noise() -> None:
     for picture in (np.zeros_like(GREY), np.full_like(GREY, 255), GREY, *map(noise, range(24))):
         assert DETECTOR.detect(picture) == []
 
 
-def test_there_is_nothing_on_a_marker_of_colours():
+def test_there_is_nothing_on_a_marker_of_colours() -> None:
     plain = Camera(PLANE, WorldParameters())
     looking, seen = pose_on_surface(PLANE, 0.89, 0.5, 0.0), pose_on_surface(PLANE, 0.89, 0.82, 0.6)
     sensor = Sensor(WORLD.camera, 0, "test")
@@ -163,7 +177,7 @@ def test_there_is_nothing_on_a_marker_of_colours():
 
 
 @pytest.mark.parametrize("hidden", ["left", "right", "top", "bottom"])
-def test_a_tag_whose_dark_square_is_partly_covered_is_not_found(hidden):
+def test_a_tag_whose_dark_square_is_partly_covered_is_not_found(hidden: str) -> None:
     picture = drawn(Face.TARGET, [(100, 60), (150, 60), (150, 110), (100, 110)])
     rows, columns = {
         "left": (slice(None), slice(0, 112)),
@@ -175,7 +189,7 @@ def test_a_tag_whose_dark_square_is_partly_covered_is_not_found(hidden):
     assert DETECTOR.detect(picture) == []
 
 
-def test_other_tags_of_the_dictionary_are_left_alone():
+def test_other_tags_of_the_dictionary_are_left_alone() -> None:
     corners = np.array([(100, 60), (150, 60), (150, 110), (100, 110)])
     assert one(DETECTOR, drawn(Face.TARGET, corners))[0] is Face.TARGET
     other = cv2.aruco.generateImageMarker(aruco_patterns.dictionary(), 17, MODULES * 7)
@@ -186,12 +200,12 @@ def test_other_tags_of_the_dictionary_are_left_alone():
 
 
 @pytest.mark.parametrize("bad", [None, [[0]], GREY[..., 0], GREY[:-1], GREY.astype(float), GREY[:, ::2]])
-def test_a_picture_of_another_shape_or_type_is_refused(bad):
+def test_a_picture_of_another_shape_or_type_is_refused(bad: list[list[int]] | npt.NDArray[np.uint8] | None) -> None:
     with pytest.raises(PictureError):
         DETECTOR.process(bad, 0)
 
 
-def test_tags_are_tracked_as_blocks_of_a_colour_are():
+def test_tags_are_tracked_as_blocks_of_a_colour_are() -> None:
     detector = TagDetector(tracking=DetectorParameters(block_filtering=40))
     picture = drawn(Face.FRONT, [(100, 60), (150, 60), (150, 110), (100, 110)])
     reports = [detector.process(picture, 33_333 * number) for number in range(24)]
@@ -206,20 +220,20 @@ def test_tags_are_tracked_as_blocks_of_a_colour_are():
 
 
 @pytest.mark.parametrize("enlargement", [1, 2, 3, 4])
-def test_an_enlarged_search_reports_places_in_the_cameras_pixels(enlargement):
+def test_an_enlarged_search_reports_places_in_the_cameras_pixels(enlargement: int) -> None:
     truth = np.array([(120.0, 40.0), (170.0, 40.0), (170.0, 90.0), (120.0, 90.0)])
     detector = TagDetector(TagParameters(enlargement=enlargement))
     np.testing.assert_allclose(one(detector, drawn(Face.REAR, truth))[1], truth, atol=0.8)
 
 
-def test_tags_smaller_than_the_shortest_outline_are_not_looked_at():
+def test_tags_smaller_than_the_shortest_outline_are_not_looked_at() -> None:
     picture = drawn(Face.TARGET, [(100, 60), (150, 60), (150, 110), (100, 110)])
     dark = 4 * 50 * MODULES / (MODULES + 2 * QUIET_MODULES)
     assert TagDetector(TagParameters(min_perimeter_px=0.8 * dark)).detect(picture)
     assert not TagDetector(TagParameters(min_perimeter_px=1.2 * dark)).detect(picture)
 
 
-def test_the_three_patterns_differ_in_many_modules_whichever_way_they_are_turned():
+def test_the_three_patterns_differ_in_many_modules_whichever_way_they_are_turned() -> None:
     for face in Face:
         for other in Face:
             for quarter in range(4):
@@ -227,20 +241,20 @@ def test_the_three_patterns_differ_in_many_modules_whichever_way_they_are_turned
                     assert np.count_nonzero(pattern(face) != np.rot90(pattern(other), quarter)) >= 6
 
 
-def test_a_dark_border_surrounds_every_pattern():
+def test_a_dark_border_surrounds_every_pattern() -> None:
     for face in Face:
         assert not np.delete(pattern(face), range(1, MODULES - 1), axis=0).any()
         assert not np.delete(pattern(face), range(1, MODULES - 1), axis=1).any()
 
 
-def test_an_opencv_without_the_detector_is_one_clear_line(monkeypatch):
+def test_an_opencv_without_the_detector_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(cv2.aruco, "ArucoDetector")
     with pytest.raises(TagError, match=r"OpenCV 4\.7 or newer") as caught:
         TagDetector()
     assert "\n" not in str(caught.value)
 
 
-def test_a_view_at_30_degrees_shows_a_face_narrower_not_lower():
+def test_a_view_at_30_degrees_shows_a_face_narrower_not_lower() -> None:
     picture, _ = rendered(0.0, 0.45, math.radians(30))
     box = next(box for box in DETECTOR.detect(picture) if box.signature == Face.TARGET)
     assert box.width < 0.95 * box.height

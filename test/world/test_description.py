@@ -2,8 +2,12 @@
 
 import math
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree.ElementTree import Element
 
 import numpy as np
+import numpy.typing as npt
 import pybullet
 import pytest
 
@@ -16,48 +20,55 @@ from robot_formation.world.pose import pose_on_surface
 from world_helpers import parameters
 
 
-def tree_of(settings=None, *, camera=True):
+def tree_of(settings: WorldParameters | None = None, *, camera: bool = True) -> Element:
     return ElementTree.fromstring(robot_description("follower_1", settings or WorldParameters(), camera=camera))
 
 
-def rotation(rpy):
+def value(element: Element, path: str, attribute: str) -> str:
+    """An attribute of the element at this path."""
+    found = element.find(path)
+    assert found is not None, path
+    return found.attrib[attribute]
+
+
+def rotation(rpy: Sequence[float]) -> npt.NDArray[np.float64]:
     """URDF's fixed-axis roll, pitch, yaw as a matrix."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
     about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x
+    matrix: npt.NDArray[np.float64] = about_z @ about_y @ about_x
+    return matrix
 
 
-def frames(tree):
+def frames(tree: Element) -> dict[str, npt.NDArray[np.float64]]:
     """Pose (4, 4) in base_link of every link."""
     found = {"base_link": np.eye(4)}
     for joint in tree.iter("joint"):
-        origin = joint.find("origin")
         step = np.eye(4)
-        step[:3, :3] = rotation([float(v) for v in origin.get("rpy").split()])
-        step[:3, 3] = [float(v) for v in origin.get("xyz").split()]
-        found[joint.find("child").get("link")] = found[joint.find("parent").get("link")] @ step
+        step[:3, :3] = rotation([float(v) for v in value(joint, "origin", "rpy").split()])
+        step[:3, 3] = [float(v) for v in value(joint, "origin", "xyz").split()]
+        found[value(joint, "child", "link")] = found[value(joint, "parent", "link")] @ step
     return found
 
 
-def test_it_is_one_tree_with_the_documented_links():
+def test_it_is_one_tree_with_the_documented_links() -> None:
     tree = tree_of()
-    links = [link.get("name") for link in tree.iter("link")]
+    links = [link.get("name", "") for link in tree.iter("link")]
     assert sorted(links) == sorted(["base_link", *JOINTS, "marker", "camera_link", "camera_optical_frame"])
     assert tree.tag == "robot"
     assert tree.get("name") == "follower_1"
-    children = [joint.find("child").get("link") for joint in tree.iter("joint")]
+    children = [value(joint, "child", "link") for joint in tree.iter("joint")]
     assert sorted([*children, "base_link"]) == sorted(links)
     assert set(frames(tree)) == set(links)
 
 
-def test_a_robot_without_camera_has_no_camera_links():
-    assert not [link for link in tree_of(camera=False).iter("link") if "camera" in link.get("name")]
+def test_a_robot_without_camera_has_no_camera_links() -> None:
+    assert not [link for link in tree_of(camera=False).iter("link") if "camera" in link.get("name", "")]
 
 
 @pytest.mark.parametrize("view", [{}, {"pan_deg": 60.0, "tilt_deg": 12.0, "x_m": 0.03}])
-def test_the_optical_frame_is_the_simulated_cameras(view):
+def test_the_optical_frame_is_the_simulated_cameras(view: dict[str, float]) -> None:
     settings = parameters(camera=view)
     ground = make_surface("bowl")
     pose = pose_on_surface(ground, 0.5, 0.6, 0.4)
@@ -67,34 +78,38 @@ def test_the_optical_frame_is_the_simulated_cameras(view):
     assert pose.matrix() @ optical[:3, 3] + pose.position == pytest.approx(lens, abs=1e-6)
 
 
-def test_joints_of_wheels_are_those_of_the_joint_states_and_turn_the_right_way():
+def test_joints_of_wheels_are_those_of_the_joint_states_and_turn_the_right_way() -> None:
     joints = {joint.get("name"): joint for joint in tree_of().iter("joint")}
-    radii = {link.get("name"): link.find("visual/geometry/cylinder") for link in tree_of().iter("link")}
+    radii = {
+        link.get("name"): value(link, "visual/geometry/cylinder", "radius")
+        for link in tree_of().iter("link")
+        if link.find("visual/geometry/cylinder") is not None
+    }
     for name in JOINTS:
         joint = joints[name]
         assert joint.get("type") == "continuous"
-        axis = np.array([float(v) for v in joint.find("axis").get("xyz").split()])
+        axis = np.array([float(v) for v in value(joint, "axis", "xyz").split()])
         # A wheel on the ground that turns about its axis carries its middle along axis x up.
         carried = np.cross(axis, [0.0, 0.0, 1.0])
         assert carried == pytest.approx([0, 1, 0] if name == "encoder_wheel_u" else [1, 0, 0])
-        radius = float(radii[name].get("radius"))
+        radius = float(radii[name])
         assert frames(tree_of())[name][2, 3] == pytest.approx(radius)
     front_left = frames(tree_of())["front_left_wheel"][:3, 3]
     assert front_left == pytest.approx([0.11, 0.095, 0.03])
 
 
-def test_sizes_masses_and_the_marker_follow_the_parameters():
+def test_sizes_masses_and_the_marker_follow_the_parameters() -> None:
     settings = parameters(chassis={"length_m": 0.4, "mass_kg": 2.0}, marker={"top_m": 0.25})
     tree = tree_of(settings)
     (base,) = [link for link in tree.iter("link") if link.get("name") == "base_link"]
-    assert base.find("collision/geometry/box").get("size") == "0.4 0.238 0.128"
-    assert float(base.find("inertial/mass").get("value")) == 2.0
-    izz = float(base.find("inertial/inertia").get("izz"))
+    assert value(base, "collision/geometry/box", "size") == "0.4 0.238 0.128"
+    assert float(value(base, "inertial/mass", "value")) == 2.0
+    izz = float(value(base, "inertial/inertia", "izz"))
     assert izz == pytest.approx(2.0 / 12 * (0.4**2 + 0.238**2), rel=1e-5)
     assert frames(tree)["marker"][2, 3] == pytest.approx(0.25 - 0.03)
 
 
-def test_numbers_are_finite_and_the_text_begins_as_xml():
+def test_numbers_are_finite_and_the_text_begins_as_xml() -> None:
     text = robot_description("leader", WorldParameters(), camera=False)
     assert text.startswith("<?xml")
     for element in ElementTree.fromstring(text).iter():
@@ -102,7 +117,7 @@ def test_numbers_are_finite_and_the_text_begins_as_xml():
             assert all(math.isfinite(float(v)) for v in element.get(key, "0").split())
 
 
-def test_a_reader_of_another_make_builds_the_same_frames(tmp_path):
+def test_a_reader_of_another_make_builds_the_same_frames(tmp_path: Path) -> None:
     file = tmp_path / "robot.urdf"
     file.write_text(robot_description("follower_1", WorldParameters(), camera=True))
     client = pybullet.connect(pybullet.DIRECT)

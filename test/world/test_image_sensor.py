@@ -1,12 +1,16 @@
 """Exposure, flicker, white balance and noise of the cameras, each against a formula or what its name promises."""
 
+import itertools
 import math
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cases import case
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import make_surface
 from robot_formation.vision.luminance import LUMINANCE_WEIGHTS
@@ -22,22 +26,22 @@ PLANE = make_surface("plane")
 SHAPE = (208, 316, 3)
 
 
-def sensor(*, seed=1, **camera):
+def sensor(*, seed: int = 1, **camera: Any) -> Sensor:
     return Sensor(parameters(camera=camera).camera, seed, "follower_1")
 
 
-def flat(light, shape=SHAPE):
+def flat(light: float | tuple[float, float, float], shape: tuple[int, int, int] = SHAPE) -> npt.NDArray[np.uint16]:
     """A picture of one linear light, grey or (red, green, blue), full scale 1."""
     return np.broadcast_to(np.rint(np.array(light, float) * FULL), shape).astype(np.uint16)
 
 
-def scene(distance=0.32, ahead=0.0, *, near=True):
+def scene(distance: float = 0.32, ahead: float = 0.0, *, near: bool = True) -> npt.NDArray[np.uint16]:
     camera = Camera(PLANE, parameters())
     seen = [pose_on_surface(PLANE, 0.9 + ahead, 0.4 + distance, 0.0)] if near else []
     return camera.light(pose_on_surface(PLANE, 0.9, 0.4, 0.0), seen)
 
 
-def luma(picture):
+def luma(picture: npt.NDArray[np.float32] | npt.NDArray[np.uint8]) -> float:
     return float((picture @ LUMINANCE_WEIGHTS).mean())
 
 
@@ -46,7 +50,7 @@ def luma(picture):
 
 @pytest.mark.parametrize("brightness", [25, 50, 100, 150])
 @pytest.mark.parametrize("view", [(0.25, 0.0), (0.32, 0.0), (0.32, 0.1), (0.7, -0.1)])
-def test_the_mean_level_is_the_camera_brightness(view, brightness):
+def test_the_mean_level_is_the_camera_brightness(view: tuple[float, float], brightness: int) -> None:
     found = luma(sensor(camera_brightness=brightness, flicker_avoidance=False).develop(scene(*view)).picture)
     assert found == pytest.approx(brightness, abs=2.0)
 
@@ -58,7 +62,9 @@ def test_the_mean_level_is_the_camera_brightness(view, brightness):
     power=st.floats(0.2, 3.0),
 )
 @settings(max_examples=30, deadline=None)
-def test_the_mean_level_of_any_picture_is_the_camera_brightness_or_as_near_as_it_gets(seed, brightness, lux, power):
+def test_the_mean_level_of_any_picture_is_the_camera_brightness_or_as_near_as_it_gets(
+    seed: int, brightness: int, lux: float, power: float
+) -> None:
     # Blocks of the size of the sampling grid, so that what is sampled is the whole picture.
     blocks = 0.05 + 0.9 * np.random.default_rng(seed).random((4, 6, 3)) ** power
     light = np.rint(blocks.repeat(4, axis=0).repeat(4, axis=1) * FULL).astype(np.uint16)
@@ -71,14 +77,14 @@ def test_the_mean_level_of_any_picture_is_the_camera_brightness_or_as_near_as_it
         assert level == pytest.approx(brightness, abs=0.1)
 
 
-def test_twice_the_camera_brightness_is_twice_the_level():
+def test_twice_the_camera_brightness_is_twice_the_level() -> None:
     dim, bright = (
         luma(sensor(camera_brightness=b, flicker_avoidance=False).develop(scene()).picture) for b in (50, 100)
     )
     assert bright / dim == pytest.approx(2.0, rel=0.03)
 
 
-def test_exposure_time_comes_first_and_gain_when_the_frame_is_over():
+def test_exposure_time_comes_first_and_gain_when_the_frame_is_over() -> None:
     for lux, time_s in ((500.0, None), (50.0, 1.0 / 30.0), (0.01, 1.0 / 30.0)):
         exposure = sensor(illuminance_lux=lux, flicker_avoidance=False).develop(scene()).exposure
         assert exposure.gain == 1.0 if time_s is None else exposure.time_s == time_s
@@ -86,7 +92,7 @@ def test_exposure_time_comes_first_and_gain_when_the_frame_is_over():
     assert exposure.gain == MAX_GAIN
 
 
-def test_a_lower_frame_rate_allows_a_longer_exposure():
+def test_a_lower_frame_rate_allows_a_longer_exposure() -> None:
     times = [
         sensor(illuminance_lux=20.0, min_frames_per_second=rate, flicker_avoidance=False)
         .develop(scene())
@@ -96,7 +102,7 @@ def test_a_lower_frame_rate_allows_a_longer_exposure():
     assert times == pytest.approx([1 / 60, 1 / 30, 1 / 10])
 
 
-def test_under_500_lux_a_white_wall_saturates_between_a_hundredth_and_a_fiftieth_of_a_second():
+def test_under_500_lux_a_white_wall_saturates_between_a_hundredth_and_a_fiftieth_of_a_second() -> None:
     found = sensor(camera_brightness=255, flicker_avoidance=False).develop(flat(1.0))
     assert found.levels.min() >= 254.9
     assert found.exposure.gain == 1.0
@@ -105,7 +111,7 @@ def test_under_500_lux_a_white_wall_saturates_between_a_hundredth_and_a_fiftieth
 
 @pytest.mark.parametrize("mains", [50, 60])
 @pytest.mark.parametrize("lux", [1.0, 100.0, 500.0, 1500.0])
-def test_flicker_avoidance_exposes_for_whole_periods_of_the_light(mains, lux):
+def test_flicker_avoidance_exposes_for_whole_periods_of_the_light(mains: int, lux: float) -> None:
     exposure = sensor(mains_hz=mains, illuminance_lux=lux).develop(scene()).exposure
     periods = exposure.time_s * 2 * mains
     assert periods >= 1.0
@@ -113,13 +119,13 @@ def test_flicker_avoidance_exposes_for_whole_periods_of_the_light(mains, lux):
     assert exposure.time_s <= 1 / 30 + 1e-12
 
 
-def test_flicker_avoidance_over_exposes_in_bright_light():
-    bright = {"illuminance_lux": 5000.0}
+def test_flicker_avoidance_over_exposes_in_bright_light() -> None:
+    bright: dict[str, Any] = {"illuminance_lux": 5000.0}
     assert luma(sensor(**bright).develop(scene()).picture) > 150
     assert luma(sensor(flicker_avoidance=False, **bright).develop(scene()).picture) == pytest.approx(100.0, abs=2.0)
 
 
-def test_without_auto_exposure_the_first_picture_sets_it():
+def test_without_auto_exposure_the_first_picture_sets_it() -> None:
     fixed = sensor(auto_exposure_correction=False)
     first = fixed.develop(scene())
     dark = flat(0.05)
@@ -132,7 +138,7 @@ def test_without_auto_exposure_the_first_picture_sets_it():
 
 
 @pytest.mark.parametrize(("lux", "gain"), [(500.0, 1.0), (10.0, None)])
-def test_noise_has_the_formulas_variance_at_any_gain(lux, gain):
+def test_noise_has_the_formulas_variance_at_any_gain(lux: float, gain: float | None) -> None:
     one = sensor(illuminance_lux=lux, flicker_avoidance=False, mains_flicker=0.0)
     development = one.develop(flat(0.5))
     first, second = (one.expose(development, 0.0).astype(float) for _ in range(2))
@@ -147,7 +153,7 @@ def test_noise_has_the_formulas_variance_at_any_gain(lux, gain):
     assert np.corrcoef(first.ravel(), second.ravel())[0, 1] == pytest.approx(0.0, abs=0.02)
 
 
-def test_white_balance_amplifies_the_noise_of_a_weak_colour():
+def test_white_balance_amplifies_the_noise_of_a_weak_colour() -> None:
     one = sensor(light_colour_rgb=[200, 200, 80])
     development = one.develop(flat(0.5))
     red, green, blue = one.expose(development, 0.0).reshape(-1, 3).std(axis=0)
@@ -157,7 +163,7 @@ def test_white_balance_amplifies_the_noise_of_a_weak_colour():
     assert blue / green == pytest.approx(math.sqrt(2.5), rel=0.04)
 
 
-def test_a_saturated_picture_has_no_noise():
+def test_a_saturated_picture_has_no_noise() -> None:
     one = sensor(illuminance_lux=20000.0)
     assert (one.expose(one.develop(flat(0.9)), 0.0) == 255).all()
 
@@ -165,12 +171,15 @@ def test_a_saturated_picture_has_no_noise():
 # --- flicker ----------------------------------------------------------------------------------------------------------
 
 
-def rows(one, light, time_s):
+def rows(one: Sensor, light: npt.NDArray[np.uint16], time_s: float) -> npt.NDArray[np.float64]:
     """Level of each row, noise averaged."""
-    return one.expose(one.develop(light), time_s).mean(axis=(1, 2))
+    levels: npt.NDArray[np.float64] = one.expose(one.develop(light), time_s).mean(axis=(1, 2))
+    return levels
 
 
-def band_phase(one, light, time_s, frequency_hz):
+def band_phase(
+    one: Sensor, light: npt.NDArray[np.uint16], time_s: float, frequency_hz: int
+) -> tuple[float, float, float]:
     """Phase in radians of the bands of this flicker, and how much of the rows' variation they explain."""
     levels = rows(one, light, time_s)
     times = READOUT_S / len(levels) * np.arange(len(levels))
@@ -182,7 +191,7 @@ def band_phase(one, light, time_s, frequency_hz):
 
 
 @pytest.mark.parametrize("mains", [50, 60])
-def test_without_avoidance_bands_have_the_lamps_period_and_move_with_time(mains):
+def test_without_avoidance_bands_have_the_lamps_period_and_move_with_time(mains: int) -> None:
     one = sensor(mains_hz=mains, flicker_avoidance=False, illuminance_lux=1000.0, mains_flicker=0.4)
     light = flat(0.6)
     exposure_s = one.develop(light).exposure.time_s
@@ -196,21 +205,22 @@ def test_without_avoidance_bands_have_the_lamps_period_and_move_with_time(mains)
     assert band_phase(one, light, 0.0, 3 * mains)[2] < 0.6
 
 
-def test_bands_vanish_with_avoidance_and_when_the_light_is_steady():
+def test_bands_vanish_with_avoidance_and_when_the_light_is_steady() -> None:
     light = flat(0.6)
     spread = {}
-    for name, camera in {
+    cameras: dict[str, dict[str, Any]] = {
         "bands": {"flicker_avoidance": False},
         "avoided": {"flicker_avoidance": True},
         "steady": {"flicker_avoidance": False, "mains_flicker": 0.0},
-    }.items():
+    }
+    for name, camera in cameras.items():
         spread[name] = rows(sensor(illuminance_lux=1500.0, **camera), light, 0.004).std()
     assert spread["bands"] > 5.0
     assert spread["avoided"] < 0.5
     assert spread["steady"] < 0.5
 
 
-def test_bands_of_a_standing_scene_move_from_frame_to_frame_in_the_world():
+def test_bands_of_a_standing_scene_move_from_frame_to_frame_in_the_world() -> None:
     a_world = world(camera={"flicker_avoidance": False, "illuminance_lux": 2000.0, "mains_flicker": 0.5})
     a_world.request_frames("follower_1", 4)
     frames = [event.image for event in of_kind(run(a_world), Frame)]
@@ -225,17 +235,18 @@ def test_bands_of_a_standing_scene_move_from_frame_to_frame_in_the_world():
 TUNGSTEN = [255, 141, 52]
 
 
-def wall(picture):
-    return picture[5:20, 5:60].reshape(-1, 3).astype(float).mean(axis=0)
+def wall(picture: npt.NDArray[np.uint8]) -> npt.NDArray[np.float64]:
+    colour: npt.NDArray[np.float64] = picture[5:20, 5:60].reshape(-1, 3).astype(float).mean(axis=0)
+    return colour
 
 
 @pytest.mark.parametrize("lamp", [[255, 255, 255], TUNGSTEN, [180, 220, 255]])
-def test_auto_white_balance_makes_the_wall_grey_under_any_lamp_also_with_the_marker_in_view(lamp):
+def test_auto_white_balance_makes_the_wall_grey_under_any_lamp_also_with_the_marker_in_view(lamp: list[int]) -> None:
     found = wall(sensor(light_colour_rgb=lamp).develop(scene(0.25)).picture)
     assert np.ptp(found) < 0.02 * found.mean()
 
 
-def test_without_white_balance_the_lamps_colour_stays():
+def test_without_white_balance_the_lamps_colour_stays() -> None:
     off = {"auto_white_balance": False, "auto_white_balance_on_power_up": False}
     development = sensor(light_colour_rgb=TUNGSTEN, camera_brightness=60, illuminance_lux=200.0, **off).develop(scene())
     red, green, blue = wall(development.picture)
@@ -244,21 +255,21 @@ def test_without_white_balance_the_lamps_colour_stays():
     assert blue / green == pytest.approx((52 / 141) ** (1 / 1.5), rel=0.03)
 
 
-def test_white_balance_on_power_up_keeps_what_the_first_picture_gave():
+def test_white_balance_on_power_up_keeps_what_the_first_picture_gave() -> None:
     one = sensor(auto_white_balance=False, auto_white_balance_on_power_up=True, light_colour_rgb=TUNGSTEN)
     first = one.develop(flat((0.4, 0.4, 0.5))).balance
     assert first == pytest.approx((1.0, 255 / 141, 255 / 52 * 0.4 / 0.5), rel=1e-3)
     assert one.develop(flat((0.4, 0.3, 0.4))).balance == first
 
 
-def test_a_picture_without_anything_near_grey_is_left_as_it_is():
+def test_a_picture_without_anything_near_grey_is_left_as_it_is() -> None:
     assert sensor().develop(flat((0.8, 0.05, 0.05))).balance == (1.0, 1.0, 1.0)
     assert sensor().develop(flat(0.0)).balance == (1.0, 1.0, 1.0)
 
 
 @given(lamp=st.lists(st.integers(1, 255), min_size=3, max_size=3), lux=st.floats(1.0, 1000.0))
 @settings(max_examples=20, deadline=None)
-def test_the_illuminance_alone_says_how_bright_a_lamp_of_any_colour_is(lamp, lux):
+def test_the_illuminance_alone_says_how_bright_a_lamp_of_any_colour_is(lamp: list[int], lux: float) -> None:
     off = {"auto_white_balance": False, "auto_white_balance_on_power_up": False, "flicker_avoidance": False}
     small = {"height_px": 16, "width_px": 16, **off, "camera_brightness": 0}
     # The shortest exposure of all: nothing saturates.
@@ -274,11 +285,14 @@ def test_the_illuminance_alone_says_how_bright_a_lamp_of_any_colour_is(lamp, lux
 # --- extremes and state -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("brightness", [0, 1, 100, 255])
 @pytest.mark.parametrize("lux", [0.0, 1e-6, 500.0, 2e5])
-@pytest.mark.parametrize("light", [0.0, 1e-4, 1.0])
-@pytest.mark.parametrize("avoid", [True, False])
-def test_extreme_light_gives_a_picture_of_finite_levels(brightness, lux, light, avoid):
+def test_extreme_light_gives_a_picture_of_finite_levels(lux: float) -> None:
+    for brightness, light, avoid in itertools.product((0, 1, 100, 255), (0.0, 1e-4, 1.0), (True, False)):
+        with case(f"brightness {brightness}", f"light {light}", "avoidance" if avoid else "no avoidance"):
+            check_extreme_light(brightness, lux, light, avoid)
+
+
+def check_extreme_light(brightness: int, lux: float, light: float, avoid: bool) -> None:
     one = sensor(camera_brightness=brightness, illuminance_lux=lux, flicker_avoidance=avoid, mains_flicker=1.0)
     development = one.develop(flat(light))
     assert np.isfinite(development.levels).all()
@@ -291,11 +305,11 @@ def test_extreme_light_gives_a_picture_of_finite_levels(brightness, lux, light, 
         assert development.exposure.gain == MAX_GAIN
 
 
-def test_a_frame_rate_that_is_no_whole_number_of_steps_is_refused_in_one_sentence():
+def test_a_frame_rate_that_is_no_whole_number_of_steps_is_refused_in_one_sentence() -> None:
     with pytest.raises(ParameterError, match=r"min_frames_per_second' is 61 Hz.*must divide physics_hz = 240"):
         parameters(camera={"min_frames_per_second": 61})
 
 
-def test_a_lamp_needs_three_colours():
+def test_a_lamp_needs_three_colours() -> None:
     with pytest.raises(ParameterError, match="light_colour_rgb' needs three numbers"):
         parameters(camera={"light_colour_rgb": [255, 255]})

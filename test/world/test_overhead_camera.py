@@ -3,37 +3,40 @@
 import math
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from robot_formation.experiment.scenario import load_track
 from robot_formation.parameters import to_mapping
-from robot_formation.surface import make_surface
+from robot_formation.surface import Surface, make_surface
 from robot_formation.vision.overhead.dots import find_dots
 from robot_formation.world.overhead import OverheadCamera
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.pose import pose_on_surface
+from robot_formation.world.pose import Pose, pose_on_surface
 from world_helpers import parameters
 
 BOWL = make_surface("bowl")
 P = WorldParameters().overhead
 
 
-def camera(surface=BOWL, seed=3, **values):
+def camera(surface: Surface = BOWL, seed: int = 3, **values: float) -> OverheadCamera:
     return OverheadCamera(surface, parameters(overhead=values), seed)
 
 
-def dot_of(pose):
+def dot_of(pose: Pose) -> npt.NDArray[np.float64]:
     return np.array(pose.position) + pose.matrix() @ [0.0, 0.0, 0.216]
 
 
-def poses(generator, count):
+def poses(generator: np.random.Generator, count: int) -> list[Pose]:
     return [
-        pose_on_surface(BOWL, *generator.uniform(0.05, 1.73, 2), generator.uniform(-math.pi, math.pi))
-        for _ in range(count)
+        pose_on_surface(BOWL, x, y, yaw)
+        for x, y, yaw in (
+            (*generator.uniform(0.05, 1.73, 2), generator.uniform(-math.pi, math.pi)) for _ in range(count)
+        )
     ]
 
 
-def distorted(point):
+def distorted(point: npt.NDArray[np.float64]) -> tuple[float, float]:
     """OpenCV's five-parameter model, written out from its documentation."""
     x, y = (point[0] - P.x_m) / (P.z_m - point[2]), -(point[1] - P.y_m) / (P.z_m - point[2])
     r2 = x * x + y * y
@@ -43,18 +46,18 @@ def distorted(point):
     return P.focal_length_px * u + P.centre_x_px, P.focal_length_px * v + P.centre_y_px
 
 
-def test_projection_is_opencvs_lens_model_looking_straight_down():
+def test_projection_is_opencvs_lens_model_looking_straight_down() -> None:
     points = np.random.default_rng(1).uniform([0, 0, 0], [1.78, 1.78, 0.45], (50, 3))
     assert camera().project(points) == pytest.approx(np.array([distorted(point) for point in points]), abs=1e-9)
 
 
-def test_the_pictures_right_is_plus_x_and_its_top_plus_y():
+def test_the_pictures_right_is_plus_x_and_its_top_plus_y() -> None:
     middle, right, top = camera().project(np.array([[0.89, 0.89, 0.2], [1.2, 0.89, 0.2], [0.89, 1.2, 0.2]]))
     assert right[0] > middle[0] + 50
     assert top[1] < middle[1] - 50
 
 
-def test_dots_are_drawn_where_they_are_to_a_tenth_of_a_pixel():
+def test_dots_are_drawn_where_they_are_to_a_tenth_of_a_pixel() -> None:
     generator = np.random.default_rng(2)
     seen = camera(noise=0.0)
     for pose in poses(generator, 40):
@@ -62,14 +65,14 @@ def test_dots_are_drawn_where_they_are_to_a_tenth_of_a_pixel():
         assert found == pytest.approx(seen.project(dot_of(pose)[None])[0], abs=0.1)
 
 
-def test_the_whole_plate_with_robots_at_its_corners_is_in_the_picture():
+def test_the_whole_plate_with_robots_at_its_corners_is_in_the_picture() -> None:
     corners = [(x, y) for x in (0.0, 1.78) for y in (0.0, 1.78)]
     pixels = camera().project(np.array([dot_of(pose_on_surface(BOWL, x, y, 0.7)) for x, y in corners]))
     assert pixels.min() > 8.0
     assert pixels.max() < 512.0 - 8.0
 
 
-def test_a_picture_does_not_depend_on_earlier_ones():
+def test_a_picture_does_not_depend_on_earlier_ones() -> None:
     generator = np.random.default_rng(4)
     used, robots = camera(), poses(generator, 4)
     for number in range(12):
@@ -78,14 +81,14 @@ def test_a_picture_does_not_depend_on_earlier_ones():
     assert np.array_equal(used.frame([], 0), camera().frame([], 0))
 
 
-def test_robots_out_of_view_leave_no_trace():
+def test_robots_out_of_view_leave_no_trace() -> None:
     seen = camera()
     empty = seen.view([])
     for x, y in ((-3.0, 0.9), (30.0, 30.0), (0.9, 9.0)):
         assert np.array_equal(seen.view([pose_on_surface(make_surface("plane"), x, y, 0.0)]), empty)
 
 
-def test_a_picture_handed_out_is_not_drawn_into_later():
+def test_a_picture_handed_out_is_not_drawn_into_later() -> None:
     seen = camera()
     first = seen.view([])
     copy = first.copy()
@@ -93,7 +96,7 @@ def test_a_picture_handed_out_is_not_drawn_into_later():
     assert np.array_equal(first, copy)
 
 
-def test_noise_has_its_size_and_depends_on_seed_and_number_only():
+def test_noise_has_its_size_and_depends_on_seed_and_number_only() -> None:
     seen = camera(noise=2.0)
     noise = seen.frame([], 7).astype(float) - seen.view([])
     assert noise.std() == pytest.approx(math.sqrt(2.0**2 + 1 / 12), rel=0.03)
@@ -105,7 +108,7 @@ def test_noise_has_its_size_and_depends_on_seed_and_number_only():
     assert not np.array_equal(camera(seed=4, noise=2.0).frame([], 7), seen.frame([], 7))
 
 
-def test_the_good_calibration_of_config_is_the_camera_of_config():
+def test_the_good_calibration_of_config_is_the_camera_of_config() -> None:
     scenario = load_track("two")
     world, tracker = scenario.world, scenario.overhead_tracker
     camera_values, good = to_mapping(world.overhead), to_mapping(tracker.good)

@@ -1,6 +1,7 @@
 """A robot whose reference dot leaves the plate is held there; one that would start beyond it is refused."""
 
 import math
+from typing import Any
 
 import pytest
 
@@ -15,14 +16,14 @@ from world_helpers import SPEEDS, of_kind, run, world
 NEAR_EDGE = (RobotStart("leader", 0.89, 1.7, 0.5 * math.pi), RobotStart("follower_1", 1.3, 0.9, 0.5 * math.pi))
 
 
-def leave(**values):
+def leave(**values: bool) -> tuple[World, list[Any]]:
     a_world = world("bowl", NEAR_EDGE, **values)
     a_world.command("leader", (8.0,) * 4, SPEEDS)
     return a_world, run(a_world)
 
 
 @pytest.mark.parametrize("sleep", [True, False])
-def test_a_robot_is_held_where_its_dot_leaves_the_plate(sleep):
+def test_a_robot_is_held_where_its_dot_leaves_the_plate(sleep: bool) -> None:
     a_world, events = leave(sleep=sleep)
     (left,) = of_kind(events, LeftPlate)
     assert left.robot == "leader"
@@ -39,7 +40,7 @@ def test_a_robot_is_held_where_its_dot_leaves_the_plate(sleep):
     assert not a_world.owes
 
 
-def test_it_takes_no_more_commands_and_the_others_go_on():
+def test_it_takes_no_more_commands_and_the_others_go_on() -> None:
     a_world, _ = leave()
     before = a_world.ground_truth("leader")
     with pytest.raises(WorldError, match="has left the plate"):
@@ -50,7 +51,7 @@ def test_it_takes_no_more_commands_and_the_others_go_on():
     assert a_world.ground_truth("leader") == before
 
 
-def test_wheels_may_stand_beside_the_plate():
+def test_wheels_may_stand_beside_the_plate() -> None:
     starts = (RobotStart("leader", 0.05, 0.6, 0.5 * math.pi), RobotStart("follower_1", 1.7, 0.6, 0.5 * math.pi))
     a_world = world("bowl", starts)
     a_world.command("leader", (1.6,) * 4, SPEEDS)
@@ -58,14 +59,14 @@ def test_wheels_may_stand_beside_the_plate():
 
 
 @pytest.mark.parametrize("place", [(-0.1, 0.5), (0.5, -0.1), (1.9, 0.5), (0.5, 1.9)])
-def test_a_start_beyond_the_plate_is_refused_with_one_line(place):
+def test_a_start_beyond_the_plate_is_refused_with_one_line(place: tuple[float, float]) -> None:
     with pytest.raises(WorldError, match=r"'leader' can't start: its reference dot .* beyond the plate") as caught:
         world("plane", (RobotStart("leader", *place, 0.0),))
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", sorted(SURFACES))
-def test_on_every_surface_a_drive_off_the_plate_ends_soon_and_near(name):
+def test_on_every_surface_a_drive_off_the_plate_ends_soon_and_near(name: str) -> None:
     surface = make_surface(name)
     start = RobotStart("leader", 1.6, 1.2, 0.0, camera=False)
     a_world = World(surface, [start], WorldParameters(), seed=2)

@@ -1,4 +1,5 @@
 import math
+from typing import Any
 
 import pytest
 
@@ -12,7 +13,7 @@ RADIUS = 0.030
 ARM = 0.110 + 0.095
 
 
-def wheel_angles(v_x, v_y, turn):
+def wheel_angles(v_x: float, v_y: float, turn: float) -> tuple[float, ...]:
     across = ARM * turn
     return tuple(
         value / RADIUS for value in (v_x - v_y - across, v_x + v_y + across, v_x + v_y - across, v_x - v_y + across)
@@ -22,8 +23,8 @@ def wheel_angles(v_x, v_y, turn):
 @pytest.mark.parametrize(
     ("v_x", "v_y", "turn"), [(0.2, 0, 0), (-0.2, 0, 0), (0, 0.1, 0), (0.1, 0.1, 0), (0, 0, 0.6), (0, 0, -0.6)]
 )
-def test_an_ideal_robot_on_level_ground_follows_mecanum_kinematics(v_x, v_y, turn):
-    with_ideal_rollers = {"motor": {"drive_mode": "pid"}, "traction": {"roller_drag": 0.0}, **IDEAL}
+def test_an_ideal_robot_on_level_ground_follows_mecanum_kinematics(v_x: float, v_y: float, turn: float) -> None:
+    with_ideal_rollers: dict[str, Any] = {"motor": {"drive_mode": "pid"}, "traction": {"roller_drag": 0.0}, **IDEAL}
     a_world = world(robots=ALONE, **with_ideal_rollers)
     start = a_world.ground_truth("leader")
     a_world.command("leader", wheel_angles(v_x, v_y, turn), (4.0,) * 4)
@@ -34,7 +35,7 @@ def test_an_ideal_robot_on_level_ground_follows_mecanum_kinematics(v_x, v_y, tur
     assert moved[2] == pytest.approx(turn, abs=0.005 * scale / ARM)
 
 
-def test_roller_drag_costs_little_and_only_off_the_forward_direction():
+def test_roller_drag_costs_little_and_only_off_the_forward_direction() -> None:
     a_world = world(robots=ALONE, motor={"drive_mode": "pid"}, **IDEAL)
     start = a_world.ground_truth("leader")
     a_world.command("leader", wheel_angles(0.2, 0, 0), (4.0,) * 4)
@@ -46,8 +47,8 @@ def test_roller_drag_costs_little_and_only_off_the_forward_direction():
     assert displacement(a_world, "leader", start)[1] == pytest.approx(0.1, rel=0.01)
 
 
-def test_pwm_stop_overshoots_on_the_level_and_more_downhill_than_uphill():
-    def forward(surface, heading):
+def test_pwm_stop_overshoots_on_the_level_and_more_downhill_than_uphill() -> None:
+    def forward(surface: str, heading: float) -> float:
         a_world = world(surface, (RobotStart("leader", 0.89, 1.7, heading, camera=False),), **IDEAL)
         start = a_world.ground_truth("leader")
         a_world.command("leader", wheel_angles(0.05, 0, 0), SPEEDS)
@@ -60,7 +61,7 @@ def test_pwm_stop_overshoots_on_the_level_and_more_downhill_than_uphill():
     assert down > level + 0.003
 
 
-def test_a_standing_robot_does_not_creep_on_the_steepest_slope():
+def test_a_standing_robot_does_not_creep_on_the_steepest_slope() -> None:
     corner = (RobotStart("leader", 0.08, 0.08, 1.0),)
     a_world = world("bowl", corner, sleep=False, camera={"mode": "on_demand"})
     start = a_world.ground_truth("leader")
@@ -72,7 +73,7 @@ def test_a_standing_robot_does_not_creep_on_the_steepest_slope():
     assert abs(moved[2]) < 1e-4
 
 
-def test_a_robot_slides_when_friction_is_below_the_hold_limit():
+def test_a_robot_slides_when_friction_is_below_the_hold_limit() -> None:
     corner = (RobotStart("leader", 0.15, 0.15, 1.0),)
     a_world = world("bowl", corner, sleep=False, camera={"mode": "on_demand"}, traction={"friction": 0.15})
     start = a_world.ground_truth("leader")
@@ -84,7 +85,7 @@ def test_a_robot_slides_when_friction_is_below_the_hold_limit():
 
 
 @pytest.mark.parametrize("surface", ["plane", "bowl"])
-def test_robots_start_at_rest_exactly_where_they_were_asked_to(surface):
+def test_robots_start_at_rest_exactly_where_they_were_asked_to(surface: str) -> None:
     a_world = world(surface)
     assert (a_world.step_count, a_world.stamp_ns) == (0, 0)
     for robot in PAIR:
@@ -95,7 +96,7 @@ def test_robots_start_at_rest_exactly_where_they_were_asked_to(surface):
         assert (state.linear_m_s, state.angular_rad_s) == ((0.0,) * 3, (0.0,) * 3)
 
 
-def test_only_the_last_joint_states_of_a_motion_have_no_velocity():
+def test_only_the_last_joint_states_of_a_motion_have_no_velocity() -> None:
     a_world = world()
     a_world.command("leader", STRAIGHT, SPEEDS)
     events = run(a_world)
@@ -111,7 +112,7 @@ def test_only_the_last_joint_states_of_a_motion_have_no_velocity():
     assert last_pose.state == a_world.ground_truth("leader")
 
 
-def test_encoder_wheels_measure_the_displacement_and_count_from_the_start():
+def test_encoder_wheels_measure_the_displacement_and_count_from_the_start() -> None:
     a_world = world(robots=ALONE, **IDEAL)
     start = a_world.ground_truth("leader")
     a_world.command("leader", wheel_angles(0.1, 0.05, 0), (4.0, 4.0, 4.0, 4.0))
@@ -124,7 +125,7 @@ def test_encoder_wheels_measure_the_displacement_and_count_from_the_start():
     assert final.positions[4] / pulse == pytest.approx(round(final.positions[4] / pulse), abs=1e-6)
 
 
-def test_a_zero_command_brakes_a_running_motion():
+def test_a_zero_command_brakes_a_running_motion() -> None:
     a_world = world()
     a_world.command("leader", (20.0,) * 4, SPEEDS)
     for _ in range(4):
@@ -135,7 +136,7 @@ def test_a_zero_command_brakes_a_running_motion():
     assert 0.0 < final.positions[0] < 5.0
 
 
-def test_a_stalled_motion_is_finished_and_says_so():
+def test_a_stalled_motion_is_finished_and_says_so() -> None:
     a_world = world(motion_timeout_s=0.5)
     a_world.command("leader", (100.0,) * 4, SPEEDS)
     final = of_kind(run(a_world), JointStates)[-1]
@@ -144,7 +145,7 @@ def test_a_stalled_motion_is_finished_and_says_so():
     assert 0.5 <= final.stamp_ns * 1e-9 < 1.6
 
 
-def test_a_sleeping_robot_wakes_when_it_is_hit():
+def test_a_sleeping_robot_wakes_when_it_is_hit() -> None:
     robots = (RobotStart("leader", 0.5, 0.5, 0.0, camera=False), RobotStart("follower_1", 0.9, 0.5, 0.0, camera=False))
     a_world = world(robots=robots)
     a_world.command("leader", (4.0,) * 4, SPEEDS)

@@ -27,7 +27,7 @@ TAGS = {"marker": {"kind": "tags"}}
 
 @needs_tags
 @pytest.mark.parametrize(("face", "name"), [(Face.TARGET, "target"), (Face.FRONT, "front"), (Face.REAR, "rear")])
-def test_each_face_shows_its_pattern_upright_and_not_mirrored(face, name):
+def test_each_face_shows_its_pattern_upright_and_not_mirrored(face: Face, name: str) -> None:
     # Seen from near by a camera of four times the resolution, module by module.
     sharp = {"width_px": 1264, "height_px": 832, "focal_length_px": 1094.8, "centre_x_px": 631.5, "centre_y_px": 415.5}
     picture = marker_picture(parameters(**TAGS, camera=sharp), name).mean(axis=2)
@@ -39,7 +39,7 @@ def test_each_face_shows_its_pattern_upright_and_not_mirrored(face, name):
 
 
 @needs_tags
-def test_the_tag_has_the_size_of_the_face_in_the_picture():
+def test_the_tag_has_the_size_of_the_face_in_the_picture() -> None:
     light = Camera(PLANE, parameters(**TAGS)).light(
         pose_on_surface(PLANE, 0.9, 0.4, 0.0), [pose_on_surface(PLANE, 0.9, 0.72, 0.0)]
     )
@@ -52,7 +52,7 @@ def test_the_tag_has_the_size_of_the_face_in_the_picture():
 
 @needs_tags
 @pytest.mark.parametrize("face", Face)
-def test_rectangles_lie_on_their_face_inside_its_margin_and_look_outward(face):
+def test_rectangles_lie_on_their_face_inside_its_margin_and_look_outward(face: Face) -> None:
     edge, middle = 0.06, 0.186
     found = list(tag_rectangles(face, edge, middle))
     normal = np.array(FACES[face])
@@ -70,7 +70,7 @@ def test_rectangles_lie_on_their_face_inside_its_margin_and_look_outward(face):
     assert area == pytest.approx(np.count_nonzero(pattern(face)) * module**2)
 
 
-def test_a_world_of_colours_has_the_same_faces_whatever_its_tags_would_look_like():
+def test_a_world_of_colours_has_the_same_faces_whatever_its_tags_would_look_like() -> None:
     plain = Scene(PLANE, WorldParameters())
     other = Scene(PLANE, parameters(marker={"tag_light_rgb": [1, 2, 3], "tag_dark_rgb": [4, 5, 6]}))
     assert len(plain._faces) == len(other._faces) == 16
@@ -79,28 +79,30 @@ def test_a_world_of_colours_has_the_same_faces_whatever_its_tags_would_look_like
 
 
 @needs_tags
-def test_the_colour_of_light_and_dark_is_what_the_parameters_say():
+def test_the_colour_of_light_and_dark_is_what_the_parameters_say() -> None:
     marker = {"kind": "tags", "tag_light_rgb": [200, 0, 0], "tag_dark_rgb": [0, 0, 200]}
     picture = marker_picture(parameters(marker=marker))
     assert picture[53 - 22, 157].argmax() == 0
     assert picture[53 - 17, 157].argmax() == 2
 
 
-def test_tags_need_three_numbers_per_colour():
+def test_tags_need_three_numbers_per_colour() -> None:
     with pytest.raises(ParameterError, match=r"marker\.tag_dark_rgb"):
         parameters(marker={"tag_dark_rgb": [1, 2]})
     with pytest.raises(ParameterError, match=r"marker\.kind"):
         from_mapping(WorldParameters, {"marker.kind": "tag"}, where="test")
 
 
-def test_viewers_see_light_plates_where_the_tags_are():
+def test_viewers_see_light_plates_where_the_tags_are() -> None:
     text = robot_description("leader", parameters(**TAGS), camera=False)
     assert text.count("rgb_200_200_200") == 3
     assert "rgb_205_14_16" not in text
 
 
 @pytest.mark.parametrize("aruco", [None, SimpleNamespace(DICT_5X5_50=4, drawMarker=print)])
-def test_an_opencv_without_tags_is_told_when_the_scene_is_made(monkeypatch, aruco):
+def test_an_opencv_without_tags_is_told_when_the_scene_is_made(
+    monkeypatch: pytest.MonkeyPatch, aruco: SimpleNamespace | None
+) -> None:
     monkeypatch.setattr(cv2, "aruco", aruco, raising=False)
     Scene(PLANE, WorldParameters())
     with pytest.raises(aruco_patterns.TagError, match="OpenCV"):

@@ -1,14 +1,16 @@
 """The world against closed-form truth: mecanum kinematics on level ground, statics and energy on slopes."""
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
 from robot_formation.drive.movement_system import Drive, DriveParameters
 from robot_formation.geometry.se2 import Motion
-from robot_formation.surface import SURFACES, make_surface
-from robot_formation.world.events import JointStates
+from robot_formation.surface import SURFACES, Surface, make_surface
+from robot_formation.world.events import BodyState, JointStates
 from robot_formation.world.start import RobotStart
 from robot_formation.world.world import World
 from world_helpers import IDEAL, SPEEDS, displacement, of_kind, parameters, run, world
@@ -27,12 +29,12 @@ WATCHED = {
 }
 
 
-def wheel_angles(v_x, v_y, turn):
+def wheel_angles(v_x: float, v_y: float, turn: float) -> tuple[float, ...]:
     across = ARM * turn
     return tuple(d / RADIUS for d in (v_x - v_y - across, v_x + v_y + across, v_x + v_y - across, v_x - v_y + across))
 
 
-def rolled(angles):
+def rolled(angles: Sequence[float]) -> tuple[float, float, float]:
     """Displacement of a mecanum base whose wheels have turned so far, in proportion: forward, left, turn."""
     front_left, front_right, rear_left, rear_right = (RADIUS * angle for angle in angles)
     return (
@@ -42,7 +44,7 @@ def rolled(angles):
     )
 
 
-def error(found, expected, scale):
+def error(found: tuple[float, float, float], expected: tuple[float, float, float], scale: float) -> float:
     """Largest difference over the move's length, a turn counted at the wheels."""
     return max(abs(found[0] - expected[0]), abs(found[1] - expected[1]), ARM * abs(found[2] - expected[2])) / scale
 
@@ -50,7 +52,9 @@ def error(found, expected, scale):
 @pytest.mark.parametrize("roller_drag", [0.0, 0.02])
 @pytest.mark.parametrize("mode", DRIVE_MODES)
 @pytest.mark.parametrize("move", MOVES)
-def test_the_body_moves_as_its_wheels_roll_within_half_a_percent(mode, roller_drag, move):
+def test_the_body_moves_as_its_wheels_roll_within_half_a_percent(
+    mode: str, roller_drag: float, move: tuple[float, float, float]
+) -> None:
     a_world = world(robots=ALONE, motor={"drive_mode": mode}, traction={"roller_drag": roller_drag}, **IDEAL)
     start = a_world.ground_truth("leader")
     a_world.command("leader", wheel_angles(*move), SPEEDS)
@@ -61,7 +65,7 @@ def test_the_body_moves_as_its_wheels_roll_within_half_a_percent(mode, roller_dr
 
 
 @pytest.mark.parametrize("move", MOVES)
-def test_pid_turns_the_wheels_as_commanded_so_the_body_moves_as_asked(move):
+def test_pid_turns_the_wheels_as_commanded_so_the_body_moves_as_asked(move: tuple[float, float, int]) -> None:
     a_world = world(robots=ALONE, motor={"drive_mode": "pid"}, traction={"roller_drag": 0.0}, **IDEAL)
     start = a_world.ground_truth("leader")
     a_world.command("leader", wheel_angles(*move), SPEEDS)
@@ -71,7 +75,9 @@ def test_pid_turns_the_wheels_as_commanded_so_the_body_moves_as_asked(move):
 
 
 @pytest.mark.parametrize("move", [*MOVES, (0.05, 0, 0), (0, 0.05, 0)])
-def test_pwm_stop_with_the_drives_default_calibration_moves_as_asked_within_half_a_percent(move):
+def test_pwm_stop_with_the_drives_default_calibration_moves_as_asked_within_half_a_percent(
+    move: tuple[float, float, int],
+) -> None:
     a_world, drive = world(robots=ALONE, **IDEAL), Drive(DriveParameters())
     start = a_world.ground_truth("leader")
     action = drive.move(Motion(*move))
@@ -84,7 +90,7 @@ def test_pwm_stop_with_the_drives_default_calibration_moves_as_asked_within_half
     assert error(displacement(a_world, "leader", start), move, scale) < 0.005
 
 
-def hold_limit(slope_deg, direction_deg):
+def hold_limit(slope_deg: float, direction_deg: float) -> float:
     """Least friction that holds a robot with locked wheels, `direction_deg` between uphill and its forward axis.
 
     The rollers hold along the two diagonals only, each with two of the wheels.
@@ -93,7 +99,7 @@ def hold_limit(slope_deg, direction_deg):
     return 2.0 * math.tan(math.radians(slope_deg)) * along
 
 
-def moved_after(seconds, surface, start, **values):
+def moved_after(seconds: int, surface: Surface, start: RobotStart, **values: Any) -> tuple[float, float]:
     """How far and by what angle a robot without commands has moved: metres, radians."""
     a_world = World(surface, [start], parameters(**{**WATCHED, **IDEAL, **values}), seed=1)
     before = a_world.ground_truth(start.name)
@@ -105,7 +111,7 @@ def moved_after(seconds, surface, start, **values):
     return math.hypot(forward, left), abs(turn)
 
 
-def on_slope(slope_deg, direction_deg, friction):
+def on_slope(slope_deg: float, direction_deg: float, friction: float) -> float:
     plane = make_surface("inclined_plane", {"slope_deg": slope_deg, "direction_deg": 90.0})
     start = RobotStart("leader", 0.89, 0.89, math.radians(90.0 - direction_deg))
     return moved_after(5, plane, start, traction={"friction": friction})[0]
@@ -113,19 +119,19 @@ def on_slope(slope_deg, direction_deg, friction):
 
 @pytest.mark.parametrize("slope_deg", [8.0, 14.0])
 @pytest.mark.parametrize("direction_deg", [0.0, 22.5, 45.0, 90.0, 135.0, 180.0, 290.0])
-def test_a_robot_holds_above_the_friction_limit_and_slides_below_it(slope_deg, direction_deg):
+def test_a_robot_holds_above_the_friction_limit_and_slides_below_it(slope_deg: float, direction_deg: float) -> None:
     limit = hold_limit(slope_deg, direction_deg)
     assert on_slope(slope_deg, direction_deg, 1.1 * limit) < 1e-3
     assert on_slope(slope_deg, direction_deg, 0.9 * limit) > 0.05
 
 
-def test_along_its_axes_a_robot_needs_root_two_times_the_slope_and_on_its_diagonals_twice():
+def test_along_its_axes_a_robot_needs_root_two_times_the_slope_and_on_its_diagonals_twice() -> None:
     slope = math.tan(math.radians(10.0))
     assert [hold_limit(10.0, angle) / slope for angle in (0.0, 90.0)] == pytest.approx([math.sqrt(2.0)] * 2)
     assert [hold_limit(10.0, angle) / slope for angle in (45.0, 135.0)] == pytest.approx([2.0] * 2)
 
 
-def test_nothing_creeps_in_a_minute_at_14_degrees():
+def test_nothing_creeps_in_a_minute_at_14_degrees() -> None:
     plane = make_surface("inclined_plane", {"slope_deg": 14.0})
     for heading in (0.0, 0.5 * math.pi):
         distance, turn = moved_after(60, plane, RobotStart("leader", 0.89, 0.89, heading))
@@ -133,7 +139,7 @@ def test_nothing_creeps_in_a_minute_at_14_degrees():
         assert turn < 1e-5
 
 
-def steepest(surface):
+def steepest(surface: Surface) -> tuple[float, float, float]:
     """A steep place well inside the plate, and the direction uphill there."""
     ticks = np.linspace(0.3, surface.size_m - 0.3, 25).tolist()
     x, y = max(((x, y) for x in ticks for y in ticks), key=lambda place: math.hypot(*surface.gradient(*place)))
@@ -143,7 +149,7 @@ def steepest(surface):
 
 @pytest.mark.parametrize("name", sorted(SURFACES))
 @pytest.mark.parametrize("aside", [0.0, 0.5 * math.pi])
-def test_on_every_surface_a_robot_without_commands_stays_where_it_is(name, aside):
+def test_on_every_surface_a_robot_without_commands_stays_where_it_is(name: str, aside: float) -> None:
     surface = make_surface(name)
     x, y, uphill = steepest(surface)
     distance, turn = moved_after(10, surface, RobotStart("leader", x, y, uphill + aside))
@@ -152,7 +158,7 @@ def test_on_every_surface_a_robot_without_commands_stays_where_it_is(name, aside
 
 
 @pytest.mark.parametrize("name", sorted(SURFACES))
-def test_on_every_surface_all_four_wheels_carry(name):
+def test_on_every_surface_all_four_wheels_carry(name: str) -> None:
     surface = make_surface(name)
     x, y, uphill = steepest(surface)
     for heading in (uphill, uphill + 0.25 * math.pi, uphill + 0.5 * math.pi):
@@ -166,8 +172,8 @@ def test_on_every_surface_all_four_wheels_carry(name):
         assert abs(math.remainder(state.yaw_rad - heading, 2.0 * math.pi)) < 0.1
 
 
-def test_a_wheel_in_the_air_stops_too_when_its_count_is_reached():
-    rigid = {"chassis": {"twist_stiffness_n_m": 4000.0}}
+def test_a_wheel_in_the_air_stops_too_when_its_count_is_reached() -> None:
+    rigid: dict[str, Any] = {"chassis": {"twist_stiffness_n_m": 4000.0}}
     a_world = world("saddle", (RobotStart("leader", 1.412, 0.111, math.radians(135)),), **rigid)
     a_world.command("leader", (1.6,) * 4, SPEEDS)
     final = of_kind(run(a_world), JointStates)[-1]
@@ -175,7 +181,7 @@ def test_a_wheel_in_the_air_stops_too_when_its_count_is_reached():
     assert max(final.positions[:4]) < 3.0
 
 
-def test_a_sliding_robot_loses_energy_all_the_time():
+def test_a_sliding_robot_loses_energy_all_the_time() -> None:
     plane = make_surface("inclined_plane", {"slope_deg": 14.0, "direction_deg": 90.0})
     values = parameters(**WATCHED, **IDEAL, traction={"friction": 0.2})
     a_world = World(plane, [RobotStart("leader", 0.89, 1.6, 0.5 * math.pi)], values, seed=1)
@@ -191,13 +197,13 @@ def test_a_sliding_robot_loses_energy_all_the_time():
     assert energies[-1] < energies[0] - 0.05
 
 
-def test_ten_robots_move_each_as_if_it_were_alone():
+def test_ten_robots_move_each_as_if_it_were_alone() -> None:
     starts = [
         RobotStart(f"robot_{n}", 0.25 + 0.32 * (n % 5), 0.45 + 0.6 * (n // 5), 0.5 * math.pi, camera=False)
         for n in range(10)
     ]
 
-    def driven(robots):
+    def driven(robots: Sequence[RobotStart]) -> list[BodyState]:
         a_world = world("bowl", robots)
         for turns in (1.6, -1.0):
             for robot in robots:
@@ -210,7 +216,7 @@ def test_ten_robots_move_each_as_if_it_were_alone():
     assert all(abs(state.y_m - start.y_m) > 0.005 for state, start in zip(together, starts, strict=True))
 
 
-def test_robots_that_press_against_each_other_come_to_rest():
+def test_robots_that_press_against_each_other_come_to_rest() -> None:
     robots = [RobotStart(f"robot_{n}", 0.4, 0.3 + 0.37 * n, 0.5 * math.pi, camera=False) for n in range(3)]
     a_world = world(robots=robots)
     for turns in (3.0, 3.0, -3.0, 3.0):

@@ -1,16 +1,17 @@
 """Single steps and another start time change nothing else."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from robot_formation.surface import make_surface
-from robot_formation.world.events import Frame
+from robot_formation.world.events import Event, Frame
 from robot_formation.world.world import World
 from world_helpers import PAIR, SPEEDS, STRAIGHT, parameters, run, world
 
 
-def plain(events):
+def plain(events: Iterable[Event]) -> list[object]:
     """Events as values that compare to the last bit."""
     return [
         (event.robot, event.stamp_ns, event.image.tobytes()) if isinstance(event, Frame) else repr(event)
@@ -18,15 +19,15 @@ def plain(events):
     ]
 
 
-def begun(a_world):
+def begun(a_world: World) -> World:
     a_world.request_frames("follower_1", 3)
     a_world.command("leader", (4.0,) * 4, SPEEDS)
     return a_world
 
 
-def test_single_steps_give_the_same_events_as_going_on():
+def test_single_steps_give_the_same_events_as_going_on() -> None:
     by_steps = begun(world("bowl", seed=5))
-    events = []
+    events: list[Event] = []
     while by_steps.owes:
         before = by_steps.step_count
         events += by_steps.step()
@@ -35,8 +36,8 @@ def test_single_steps_give_the_same_events_as_going_on():
     assert plain(events) == plain(run(begun(world("bowl", seed=5))))
 
 
-def test_another_start_time_shifts_the_stamps_and_nothing_else():
-    def events(start_ns):
+def test_another_start_time_shifts_the_stamps_and_nothing_else() -> None:
+    def events(start_ns: int) -> list[Event]:
         made = World(make_surface("bowl"), PAIR, parameters(), seed=5, start_ns=start_ns)
         made.command("leader", STRAIGHT, SPEEDS)
         made.request_frames("follower_1", 20)
@@ -47,6 +48,7 @@ def test_another_start_time_shifts_the_stamps_and_nothing_else():
     for a, b in zip(first, later, strict=True):
         assert b.stamp_ns - a.stamp_ns == 7 * 10**9
         if isinstance(a, Frame):
+            assert isinstance(b, Frame)
             assert np.array_equal(a.image, b.image)
         else:
             assert replace(b, stamp_ns=a.stamp_ns) == a

@@ -1,25 +1,27 @@
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from robot_formation.parameters import ParameterError
 from robot_formation.world.checks import WorldError
-from robot_formation.world.events import Frame, JointStates, RobotPose
+from robot_formation.world.events import BodyState, Frame, JointStates, RobotPose
 from robot_formation.world.start import RobotStart
+from robot_formation.world.world import World
 from world_helpers import PAIR, SPEEDS, STRAIGHT, of_kind, parameters, run, world
 
 HOLD = (0.0,) * 4
 
 
-def test_time_stands_still_while_nothing_is_owed():
+def test_time_stands_still_while_nothing_is_owed() -> None:
     a_world = world()
     assert not a_world.owes
     assert a_world.advance() == []
     assert a_world.step_count == 0
 
 
-def test_time_stops_on_the_step_of_the_final_joint_states():
+def test_time_stops_on_the_step_of_the_final_joint_states() -> None:
     a_world = world()
     a_world.command("leader", STRAIGHT, SPEEDS)
     assert a_world.owes
@@ -28,7 +30,7 @@ def test_time_stops_on_the_step_of_the_final_joint_states():
     assert a_world.advance() == []
 
 
-def test_a_hold_takes_one_step():
+def test_a_hold_takes_one_step() -> None:
     a_world = world()
     a_world.command("leader", HOLD, HOLD)
     final = of_kind(run(a_world), JointStates)
@@ -36,7 +38,7 @@ def test_a_hold_takes_one_step():
     assert a_world.step_count == 1
 
 
-def test_stream_gives_a_frame_at_every_tick_while_a_robot_moves():
+def test_stream_gives_a_frame_at_every_tick_while_a_robot_moves() -> None:
     a_world = world()
     a_world.command("leader", STRAIGHT, SPEEDS)
     frames = of_kind(run(a_world), Frame)
@@ -45,7 +47,7 @@ def test_stream_gives_a_frame_at_every_tick_while_a_robot_moves():
     assert [frame.stamp_ns for frame in frames] == [8 * (i + 1) * 10**9 // 240 for i in range(len(frames))]
 
 
-def test_on_demand_gives_only_the_requested_frames():
+def test_on_demand_gives_only_the_requested_frames() -> None:
     a_world = world(camera={"mode": "on_demand"})
     a_world.command("leader", STRAIGHT, SPEEDS)
     assert of_kind(run(a_world), Frame) == []
@@ -59,7 +61,7 @@ def test_on_demand_gives_only_the_requested_frames():
 
 
 @pytest.mark.parametrize("mode", ["stream", "on_demand"])
-def test_requested_frames_are_stamped_later_than_the_request(mode):
+def test_requested_frames_are_stamped_later_than_the_request(mode: str) -> None:
     a_world = world(camera={"mode": mode})
     for _ in range(3):
         asked = a_world.stamp_ns
@@ -70,7 +72,7 @@ def test_requested_frames_are_stamped_later_than_the_request(mode):
         assert frame.image.dtype == np.uint8
 
 
-def test_lockstep_robots_start_together_and_a_hold_counts():
+def test_lockstep_robots_start_together_and_a_hold_counts() -> None:
     a_world = world(lockstep=["leader", "follower_1"])
     a_world.command("leader", STRAIGHT, SPEEDS)
     assert a_world.advance() == []
@@ -90,7 +92,9 @@ def test_lockstep_robots_start_together_and_a_hold_counts():
         ((1e6,) * 4, SPEEDS, "split it"),
     ],
 )
-def test_a_bad_command_is_refused_and_moves_nothing(angles, speeds, says):
+def test_a_bad_command_is_refused_and_moves_nothing(
+    angles: tuple[float, ...], speeds: tuple[float, float, float, float], says: str
+) -> None:
     a_world = world()
     with pytest.raises(WorldError, match=says) as caught:
         a_world.command("leader", angles, speeds)
@@ -99,19 +103,19 @@ def test_a_bad_command_is_refused_and_moves_nothing(angles, speeds, says):
 
 
 @pytest.mark.parametrize(("robot", "count"), [("leader", 1), ("follower_1", 0), ("follower_1", 601), ("nobody", 1)])
-def test_a_bad_frame_request_is_refused(robot, count):
+def test_a_bad_frame_request_is_refused(robot: str, count: int) -> None:
     a_world = world()
     with pytest.raises(WorldError):
         a_world.request_frames(robot, count)
     assert not a_world.owes
 
 
-def test_an_unknown_robot_gets_a_suggestion():
+def test_an_unknown_robot_gets_a_suggestion() -> None:
     with pytest.raises(WorldError, match="did you mean 'leader'"):
         world().command("laeder", STRAIGHT, SPEEDS)
 
 
-def test_setups_that_cannot_be_are_refused():
+def test_setups_that_cannot_be_are_refused() -> None:
     with pytest.raises(WorldError, match="overlap"):
         world(robots=(RobotStart("a", 0.5, 0.5, 0.0), RobotStart("b", 0.6, 0.5, 0.0)))
     with pytest.raises(WorldError, match="different"):
@@ -122,7 +126,7 @@ def test_setups_that_cannot_be_are_refused():
         parameters(camera={"min_frames_per_second": 50})
 
 
-def drive_both(a_world, follower_angles):
+def drive_both(a_world: World, follower_angles: tuple[float, float, float, float]) -> list[Any]:
     """Events of two moves of the leader, with another one of the follower between them."""
     a_world.command("leader", STRAIGHT, SPEEDS)
     events = run(a_world)
@@ -133,13 +137,13 @@ def drive_both(a_world, follower_angles):
     return events + run(a_world)
 
 
-def same(a, b):
-    if isinstance(a, Frame):
+def same(a: Frame | JointStates | RobotPose, b: Frame | JointStates | RobotPose) -> bool:
+    if isinstance(a, Frame) and isinstance(b, Frame):
         return (a.robot, a.stamp_ns) == (b.robot, b.stamp_ns) and np.array_equal(a.image, b.image)
     return a == b
 
 
-def test_the_same_seed_gives_the_same_run_to_the_last_bit_even_interleaved():
+def test_the_same_seed_gives_the_same_run_to_the_last_bit_even_interleaved() -> None:
     first = drive_both(world("bowl", seed=5), (1.0, -1.0, -1.0, 1.0))
     bystander = world("bowl", seed=8)
     second_world = world("bowl", seed=5)
@@ -150,14 +154,14 @@ def test_the_same_seed_gives_the_same_run_to_the_last_bit_even_interleaved():
     assert all(same(a, b) for a, b in zip(first, second, strict=True))
 
 
-def test_another_seed_gives_another_run():
+def test_another_seed_gives_another_run() -> None:
     first = drive_both(world("bowl", seed=5), STRAIGHT)
     second = drive_both(world("bowl", seed=6), STRAIGHT)
     assert of_kind(first, RobotPose)[-1] != of_kind(second, RobotPose)[-1]
 
 
-def test_the_leaders_path_does_not_depend_on_the_follower():
-    def leader_path(follower_angles):
+def test_the_leaders_path_does_not_depend_on_the_follower() -> None:
+    def leader_path(follower_angles: tuple[float, float, float, float]) -> list[BodyState]:
         events = drive_both(world("bowl", seed=5), follower_angles)
         finals = [event for event in of_kind(events, RobotPose, "leader") if event.final]
         return [event.state for event in finals]

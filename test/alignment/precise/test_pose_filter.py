@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -30,17 +31,17 @@ FORMATION = Motion(y_m=-FORMATION_DISTANCE_M)
 LOOKS_FROM = (0.135, -0.135, 0.12, -0.12)
 
 
-def new_filter():
+def new_filter() -> PoseFilter:
     return PoseFilter(MODEL, EDGES, FilterParameters())
 
 
-def look(pose_filter, state):
+def look(pose_filter: PoseFilter, state: npt.NDArray[np.float64]) -> None:
     pose_filter.look(bounding_boxes(blocks_of(state)))
 
 
 @settings(max_examples=12, deadline=None)
 @given(st.floats(-0.02, 0.02), st.floats(0.29, 0.4), st.floats(-0.1, 0.1))
-def test_place_and_relative_tilt_follow_from_one_look_in_formation(x_m, y_m, yaw_rad):
+def test_place_and_relative_tilt_follow_from_one_look_in_formation(x_m: float, y_m: float, yaw_rad: float) -> None:
     state, found = state_of(x_m, y_m, yaw_rad), new_filter()
     look(found, state)
     # Without the relative tilt, the side length alone would put it 1.9 cm off.
@@ -52,7 +53,7 @@ def test_place_and_relative_tilt_follow_from_one_look_in_formation(x_m, y_m, yaw
 
 @settings(max_examples=8, deadline=None)
 @given(st.floats(-0.3, 0.3), st.floats(-0.02, 0.02))
-def test_the_heading_follows_from_looks_behind_and_ahead(yaw_rad, slip_m):
+def test_the_heading_follows_from_looks_behind_and_ahead(yaw_rad: float, slip_m: float) -> None:
     truth, found = state_of(0.13, 0.33, yaw_rad), new_filter()
     look(found, truth)
     for x_m in LOOKS_FROM:
@@ -69,7 +70,7 @@ def test_the_heading_follows_from_looks_behind_and_ahead(yaw_rad, slip_m):
     st.floats(-0.2, 0.2), st.floats(0.1, 0.8), st.floats(-1.0, 1.0), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2),
     st.floats(-1.0, 1.0),
 )  # fmt: skip
-def test_moves_compose(x_m, y_m, yaw_rad, dx_m, dy_m, turn_rad):
+def test_moves_compose(x_m: float, y_m: float, yaw_rad: float, dx_m: float, dy_m: float, turn_rad: float) -> None:
     state, motion = state_of(x_m, y_m, yaw_rad), Motion(dx_m, dy_m, turn_rad)
     way = motion.then(pose_of(after_motion(state, motion)).then(FORMATION))
     direct = pose_of(state).then(FORMATION)
@@ -77,13 +78,13 @@ def test_moves_compose(x_m, y_m, yaw_rad, dx_m, dy_m, turn_rad):
 
 
 @given(st.floats(-0.2, 0.2), st.floats(0.25, 0.8), st.floats(-1.0, 1.0))
-def test_the_way_to_formation_leads_there(x_m, y_m, yaw_rad):
+def test_the_way_to_formation_leads_there(x_m: float, y_m: float, yaw_rad: float) -> None:
     state = state_of(x_m, y_m, yaw_rad)
     there = after_motion(state, pose_of(state).then(FORMATION))
     assert there[:3] == pytest.approx((0.0, FORMATION_DISTANCE_M, 0.0), abs=1e-12)
 
 
-def test_the_covariance_stays_symmetric_and_positive():
+def test_the_covariance_stays_symmetric_and_positive() -> None:
     truth, found = state_of(0.05, 0.4, 0.2), new_filter()
     for motion in (Motion(), Motion(0.1, 0.05, 0.1), Motion(-0.15, 0.0, 0.05)):
         truth = after_motion(truth, motion)
@@ -96,7 +97,9 @@ def test_the_covariance_stays_symmetric_and_positive():
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(-0.1, 0.1), st.floats(0.29, 0.4), st.floats(-0.8, 0.8), st.floats(0.4, 0.6), st.booleans())
-def test_a_whole_marker_is_told_from_a_half_covered_face(x_m, y_m, yaw_rad, share, left):
+def test_a_whole_marker_is_told_from_a_half_covered_face(
+    x_m: float, y_m: float, yaw_rad: float, share: float, left: bool
+) -> None:
     boxes = bounding_boxes(blocks_of(state_of(x_m, y_m, yaw_rad)))
     assert new_filter().whole(boxes)
     if set(boxes) == {Face.TARGET}:
@@ -116,7 +119,7 @@ def test_first_guesses_are_at_the_distance_of_the_height_without_the_detectors_b
     assert straight.state[Y] == pytest.approx(0.328 - 0.038 + 0.03)
 
 
-def test_a_block_far_from_where_its_face_should_be_is_left_out():
+def test_a_block_far_from_where_its_face_should_be_is_left_out() -> None:
     found = new_filter()
     look(found, state_of())
     (target,) = blocks_of(state_of())
@@ -125,7 +128,9 @@ def test_a_block_far_from_where_its_face_should_be_is_left_out():
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-0.3, 0.3), st.floats(0.2, 0.5), st.floats(-3.0, 3.0))
-def test_the_relative_tilt_is_the_same_whichever_way_the_follower_turns(saddle, skew, x_m, y_m, turn_rad):
+def test_the_relative_tilt_is_the_same_whichever_way_the_follower_turns(
+    saddle: float, skew: float, x_m: float, y_m: float, turn_rad: float
+) -> None:
     state = state_of(x_m, y_m)
     state[SADDLE], state[SKEW] = saddle, skew
     before = np.ravel(relative_tilt(state[None]))
@@ -134,7 +139,7 @@ def test_the_relative_tilt_is_the_same_whichever_way_the_follower_turns(saddle, 
     assert after == pytest.approx(np.array([[c, s], [-s, c]]) @ before, abs=1e-9)
 
 
-def test_steps_with_a_high_nis_are_believed_less():
+def test_steps_with_a_high_nis_are_believed_less() -> None:
     calm, inflated = new_filter(), new_filter()
     for found, aside_m in ((calm, 0.0), (inflated, 0.02)):
         state = state_of()

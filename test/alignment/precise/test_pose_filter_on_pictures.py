@@ -11,9 +11,8 @@ import pytest
 from robot_formation.alignment.precise.marker_edges import EdgeParameters, mean_boxes
 from robot_formation.alignment.precise.marker_projection import GeometryParameters, MarkerModel, pose_of
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
-from robot_formation.components.block_detector import BlockDetectorNodeParameters
-from robot_formation.components.world import WorldNodeParameters
-from robot_formation.experiment.scenario import node_defaults
+from robot_formation.components.node_parameters import BlockDetectorNodeParameters, WorldNodeParameters
+from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface

@@ -6,7 +6,9 @@ Each process that delays callbacks leaves a file with its id in the folder SLOW_
 import os
 import random
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from robot_formation.nodes.host import signals
 
@@ -14,7 +16,7 @@ LONGEST_S = 0.05
 _stop_on_signals = signals.stop_on_signals
 
 
-def stop_on_signals():
+def stop_on_signals() -> None:
     """What each node's process calls before it imports ROS."""
     _stop_on_signals()
     from robot_formation.nodes.host.component_node import Host
@@ -22,15 +24,15 @@ def stop_on_signals():
     delays = random.Random(os.getpid())
     heard = Host._heard
 
-    def slowly_heard(node, handler):
-        def slow(message):
+    def slowly_heard(node: Host, handler: Callable[[Any], None]) -> Callable[[Any], None]:
+        def slow(message: Any) -> None:
             time.sleep(delays.uniform(0.0, LONGEST_S))
             handler(message)
 
         Path(os.environ["SLOW_CALLBACKS"], str(os.getpid())).touch()
         return heard(node, slow)
 
-    Host._heard = slowly_heard
+    Host._heard = slowly_heard  # type: ignore[assignment, method-assign]
 
 
 signals.stop_on_signals = stop_on_signals

@@ -1,6 +1,9 @@
 """Closing of residual and bias, and the mixture of models: against textbooks, by hand, and on a simulated follower."""
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from predictor_helpers import HISTORY, predictor, timesteps
@@ -9,7 +12,10 @@ from robot_formation.koopman.predictors.closing import NU, Closing, ResidualFilt
 from robot_formation.koopman.predictors.formation import Mixture
 from robot_formation.koopman.predictors.models import Previous
 from robot_formation.koopman.predictors.parameters import ClosingParameters
+from robot_formation.koopman.predictors.predictor import Predictor
 from robot_formation.parameters import ParameterError
+
+Array = npt.NDArray[np.float64]
 
 CLOSING = [name for name in NAMES if name.endswith("+close") or name == "formation"]
 
@@ -17,7 +23,7 @@ CLOSING = [name for name in NAMES if name.endswith("+close") or name == "formati
 class Textbook:
     """Kalman filter of (r, w, trend) of one axis in the usual matrices, with the loss of each of its innovations."""
 
-    def __init__(self, p, axis, noise_m, level_m, trend_m):
+    def __init__(self, p: ClosingParameters, axis: int, noise_m: float, level_m: float, trend_m: float) -> None:
         step = (p.step_u_m, p.step_v_m)[axis]
         sigmas = ((p.start_u_m, p.step_sigma_u_m), (p.start_v_m, p.step_sigma_v_m))[axis]
         self.x = np.array([0.0, step, 0.0])
@@ -27,7 +33,7 @@ class Textbook:
         self.q_residual = np.diag([noise_m**2, 0.0, 0.0])
         self.q_step = np.diag([0.0, level_m**2, trend_m**2])
 
-    def observe(self, total, residual):
+    def observe(self, total: float, residual: float | None) -> float | None:
         """Move on by a timestep; return the loss, None if there was no measurement."""
         f = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         self.x = f @ self.x - np.array([total, 0.0, 0.0])
@@ -45,7 +51,7 @@ class Textbook:
         return loss
 
 
-def test_one_filter_of_the_bank_is_the_textbooks_kalman_filter():
+def test_one_filter_of_the_bank_is_the_textbooks_kalman_filter() -> None:
     p = ClosingParameters(noise_m=(0.002,), level_m=(0.001,), trend_m=(0.0005,))
     bank, books = ResidualFilter(p), [Textbook(p, axis, 0.002, 0.001, 0.0005) for axis in (0, 1)]
     for x, r, _ in timesteps(40):
@@ -57,7 +63,7 @@ def test_one_filter_of_the_bank_is_the_textbooks_kalman_filter():
     assert (bank.weights == 1.0).all()
 
 
-def test_the_bank_is_weighted_by_the_discounted_likelihood_of_its_innovations():
+def test_the_bank_is_weighted_by_the_discounted_likelihood_of_its_innovations() -> None:
     p = ClosingParameters()
     settings = list(zip(p.noise_m, p.level_m, p.trend_m, strict=True))
     bank = ResidualFilter(p)
@@ -79,7 +85,7 @@ def test_the_bank_is_weighted_by_the_discounted_likelihood_of_its_innovations():
             assert part == pytest.approx((weights * values).sum(axis=0), abs=1e-13)
 
 
-def test_the_steady_filter_wins_on_a_steady_leader_and_the_nervous_one_on_one_that_jumps():
+def test_the_steady_filter_wins_on_a_steady_leader_and_the_nervous_one_on_one_that_jumps() -> None:
     rng = np.random.default_rng(0)
     steady, jumping = ResidualFilter(ClosingParameters()), ResidualFilter(ClosingParameters())
     for _ in range(40):
@@ -90,7 +96,7 @@ def test_the_steady_filter_wins_on_a_steady_leader_and_the_nervous_one_on_one_th
     assert (jumping.weights.argmax(axis=0) == 2).all()
 
 
-def test_the_bank_needs_three_numbers_for_each_filter():
+def test_the_bank_needs_three_numbers_for_each_filter() -> None:
     for wrong in ({"noise_m": (0.001, 0.002)}, {"noise_m": (), "level_m": (), "trend_m": ()}):
         with pytest.raises(ParameterError, match="one number for each filter"):
             ClosingParameters(**wrong)
@@ -99,11 +105,11 @@ def test_the_bank_needs_three_numbers_for_each_filter():
 # --- closing --------------------------------------------------------------------------------------------------------
 
 
-def closing(**values):
+def closing(**values: Any) -> Closing:
     return Closing(ClosingParameters(**values), Previous(PredictorParameters()))
 
 
-def test_without_any_residual_displacements_are_all_there_is():
+def test_without_any_residual_displacements_are_all_there_is() -> None:
     tested = closing()
     for x in HISTORY:
         tested.observe(np.array(x), None, None)
@@ -111,7 +117,7 @@ def test_without_any_residual_displacements_are_all_there_is():
     assert (tested.bias() == 0.0).all()
 
 
-def test_a_residual_that_is_unknown_now_and_then_is_carried_on_by_what_was_driven():
+def test_a_residual_that_is_unknown_now_and_then_is_carried_on_by_what_was_driven() -> None:
     tested = closing(residual_u_m=1e-5, residual_v_m=1e-5)
     w = np.array([0.0, 0.05])
     for _ in range(30):
@@ -121,7 +127,7 @@ def test_a_residual_that_is_unknown_now_and_then_is_carried_on_by_what_was_drive
     assert tested.forecast() == pytest.approx(w + missed, abs=1e-4)
 
 
-def test_moves_that_ended_far_from_their_command_teach_no_bias():
+def test_moves_that_ended_far_from_their_command_teach_no_bias() -> None:
     tested = closing()
     tested.observe(np.array([0.0, 0.05]), None, np.array([0.0, 0.0]))
     assert (tested.bias() == 0.0).all()
@@ -130,7 +136,9 @@ def test_moves_that_ended_far_from_their_command_teach_no_bias():
     assert 0.0 < tested.bias()[1] < 0.005
 
 
-def follow(found, bias, w, count, rng, noise_m=0.001):
+def follow(
+    found: Predictor, bias: Array, w: Array, count: int, rng: np.random.Generator, noise_m: float = 0.001
+) -> Array:
     """A follower that obeys its predictor, with a constant bias; returns the true residuals."""
     command, r, residuals = np.array([0.0, 0.05]), np.zeros(2), []
     for _ in range(count):
@@ -143,7 +151,7 @@ def follow(found, bias, w, count, rng, noise_m=0.001):
 
 
 @pytest.mark.parametrize("name", CLOSING)
-def test_a_constant_bias_is_learned_and_the_leaders_step_found_and_no_residual_is_left(name):
+def test_a_constant_bias_is_learned_and_the_leaders_step_found_and_no_residual_is_left(name: str) -> None:
     bias, w = np.array([-0.004, 0.003]), np.array([0.008, 0.047])
     found = predictor(name)
     residuals = follow(found, bias, w, 80, np.random.default_rng(5))
@@ -153,7 +161,7 @@ def test_a_constant_bias_is_learned_and_the_leaders_step_found_and_no_residual_i
     assert np.abs(residuals[40:]).max() < 0.012
 
 
-def test_the_forecast_is_that_of_the_model_plus_the_filtered_residual():
+def test_the_forecast_is_that_of_the_model_plus_the_filtered_residual() -> None:
     p = ClosingParameters()
     tested, alone, model = closing(), ResidualFilter(p), Previous(PredictorParameters())
     for x, r, c in timesteps(30):
@@ -167,7 +175,7 @@ def test_the_forecast_is_that_of_the_model_plus_the_filtered_residual():
 # --- the mixture ----------------------------------------------------------------------------------------------------
 
 
-def test_the_mixture_weighs_by_discounted_squared_errors_with_an_initial_loss():
+def test_the_mixture_weighs_by_discounted_squared_errors_with_an_initial_loss() -> None:
     parameters = PredictorParameters()
     p = parameters.formation
     tested, models = Mixture(parameters), None
@@ -179,22 +187,28 @@ def test_the_mixture_weighs_by_discounted_squared_errors_with_an_initial_loss():
         if models is not None:
             losses = p.discount * losses + 0.5 * ((models - seen) / scale) ** 2
         tested.observe(x)
-        koopman = 0.05 * (tested.diagnostics().k[1:] @ [1.0, *(x / 0.05)])
+        k = tested.diagnostics().k
+        assert k is not None
+        koopman = 0.05 * (k[1:] @ [1.0, *(x / 0.05)])
         models = np.stack([x, koopman])
         weights = np.exp(-losses) / np.exp(-losses).sum(axis=0)
         assert tested.forecast() == pytest.approx((weights * models).sum(axis=0), abs=1e-14)
     shown = np.array2string(weights[1], precision=3, separator=", ")
-    assert tested.diagnostics().notes["weight of koopman"] == shown
+    notes = tested.diagnostics().notes
+    assert notes is not None
+    assert notes["weight of koopman"] == shown
 
 
-def test_persistence_is_believed_first():
+def test_persistence_is_believed_first() -> None:
     tested = Mixture(PredictorParameters())
     tested.observe(np.array([0.0, 0.05]))
-    weight = float(tested.diagnostics().notes["weight of koopman"].strip("[]").split(",")[0])
+    notes = tested.diagnostics().notes
+    assert notes is not None
+    weight = float(notes["weight of koopman"].strip("[]").split(",")[0])
     assert weight == pytest.approx(1.0 / (1.0 + np.e), abs=1e-3)
 
 
-def test_the_koopman_model_wins_where_displacements_follow_a_law():
+def test_the_koopman_model_wins_where_displacements_follow_a_law() -> None:
     """v alternates: persistence is always wrong, K = -1 about a constant is exact."""
     tested = Mixture(PredictorParameters())
     for n in range(60):

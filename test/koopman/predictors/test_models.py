@@ -3,10 +3,12 @@
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from koopman_helpers import batch
 from predictor_helpers import HISTORY, forecasts, predictor, solve_2_by_2
+from robot_formation.koopman.dictionaries import Dictionary
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.koopman.predictors.dictionary_text import dictionary_from_text
 from robot_formation.koopman.predictors.dmd import Edmd
@@ -14,15 +16,17 @@ from robot_formation.koopman.predictors.models import TrendFilter
 from robot_formation.koopman.predictors.parameters import EdmdParameters, EwmaParameters, TrendParameters
 from robot_formation.parameters import ParameterError
 
+Array = npt.NDArray[np.float64]
+
 WIDE = {"max_u_m": 10.0, "max_v_m": 10.0}
 
 
-def test_previous_repeats_the_last_displacement():
+def test_previous_repeats_the_last_displacement() -> None:
     assert forecasts("previous", HISTORY) == pytest.approx(np.array(HISTORY), abs=0.0)
 
 
 @pytest.mark.parametrize("gain", [0.0, 0.3, 1.0])
-def test_ewma_weighs_displacements_by_age(gain):
+def test_ewma_weighs_displacements_by_age(gain: float) -> None:
     found = forecasts("ewma", HISTORY, ewma=EwmaParameters(gain=gain))
     for n in range(1, len(HISTORY) + 1):
         ages = np.arange(n - 1, -1, -1)
@@ -34,7 +38,7 @@ def test_ewma_weighs_displacements_by_age(gain):
 # --- literal and measured -------------------------------------------------------------------------------------------
 
 
-def test_literal_takes_k_from_the_first_three_displacements_and_then_is_blind():
+def test_literal_takes_k_from_the_first_three_displacements_and_then_is_blind() -> None:
     x1, x2, x3 = map(np.array, HISTORY[:3])
     k = solve_2_by_2(x1, x2, x2, x3)
     expected = [x1, x2, k @ x3, k @ k @ x3, k @ k @ k @ x3, k @ k @ k @ k @ x3]
@@ -44,7 +48,7 @@ def test_literal_takes_k_from_the_first_three_displacements_and_then_is_blind():
     assert (forecasts("literal", other, **WIDE)[2:] == found[2:]).all()
 
 
-def test_measured_fits_k_to_all_measured_pairs():
+def test_measured_fits_k_to_all_measured_pairs() -> None:
     found = forecasts("measured", HISTORY, **WIDE)
     assert found[:2] == pytest.approx(np.array(HISTORY[:2]), abs=0.0)  # collection: the previous displacement
     for n in range(3, len(HISTORY) + 1):
@@ -55,13 +59,13 @@ def test_measured_fits_k_to_all_measured_pairs():
     assert found[2] == pytest.approx(solve_2_by_2(x1, x2, x2, x3) @ x3, rel=1e-9)
 
 
-def test_measured_and_literal_agree_until_there_is_something_to_learn():
+def test_measured_and_literal_agree_until_there_is_something_to_learn() -> None:
     literal, measured = (forecasts(name, HISTORY) for name in ("literal", "measured"))
     assert literal[:3] == pytest.approx(measured[:3], rel=1e-9)
     assert not np.allclose(literal[3], measured[3], rtol=1e-3)
 
 
-def test_measured_forgets_by_its_parameter():
+def test_measured_forgets_by_its_parameter() -> None:
     xs, ys = np.array(HISTORY[:-1]), np.array(HISTORY[1:])
     weights = np.sqrt(0.6) ** np.arange(len(xs) - 1, -1, -1)[:, None]
     k = np.linalg.lstsq(weights * xs, weights * ys, rcond=None)[0].T
@@ -69,7 +73,7 @@ def test_measured_forgets_by_its_parameter():
 
 
 @pytest.mark.parametrize("name", ["literal", "measured"])
-def test_a_linear_law_is_forecast_exactly(name):
+def test_a_linear_law_is_forecast_exactly(name: str) -> None:
     k = np.array([[1.02, 0.03], [-0.05, 0.99]])
     history = [np.array([0.01, 0.05])]
     for _ in range(8):
@@ -77,7 +81,7 @@ def test_a_linear_law_is_forecast_exactly(name):
     assert forecasts(name, history)[2:] == pytest.approx(np.array([k @ x for x in history[2:]]), abs=1e-9)
 
 
-def test_diagnostics_of_measured_show_the_last_innovation():
+def test_diagnostics_of_measured_show_the_last_innovation() -> None:
     found = predictor("measured")
     for x in HISTORY[:-1]:
         found.observe(np.array(x))
@@ -89,7 +93,7 @@ def test_diagnostics_of_measured_show_the_last_innovation():
 # --- the trend filter -----------------------------------------------------------------------------------------------
 
 
-def textbook(p, values, start=None):
+def textbook(p: TrendParameters, values: Array, start: tuple[float, float] | None = None) -> Array:
     """Kalman filter of one axis in the usual matrices; the predicted level after each value."""
     f = np.array([[1.0, p.damping], [0.0, p.damping]])
     q, h = np.diag([p.level_m**2, p.trend_m**2]), np.array([[1.0, 0.0]])
@@ -110,7 +114,7 @@ def textbook(p, values, start=None):
 
 
 @pytest.mark.parametrize("start", [None, (0.0, 0.008)])
-def test_the_trend_filter_is_the_textbooks_kalman_filter(start):
+def test_the_trend_filter_is_the_textbooks_kalman_filter(start: tuple[float, float] | None) -> None:
     p = TrendParameters()
     tested = TrendFilter(p)
     assert (tested.forecast() == 0.0).all()
@@ -127,7 +131,7 @@ def test_the_trend_filter_is_the_textbooks_kalman_filter(start):
         assert forecasts("kalman_trend", values) == pytest.approx(np.array(found), abs=0.0)
 
 
-def test_a_steady_trend_is_followed_and_a_jump_is_smoothed():
+def test_a_steady_trend_is_followed_and_a_jump_is_smoothed() -> None:
     ramp = [(0.0, 0.03 + 0.0005 * n) for n in range(60)]
     assert forecasts("kalman_trend", ramp)[-1][1] == pytest.approx(0.03 + 0.0005 * 60, abs=6e-4)
     step = [(0.0, 0.05)] * 10 + [(0.0, 0.06)]
@@ -139,14 +143,15 @@ def test_a_steady_trend_is_followed_and_a_jump_is_smoothed():
 DICTIONARIES = ["constant identity", "identity", "constant monomials:3", "rbf:2 identity", "delay:2 constant"]
 
 
-def lifted(text, history, scale_m):
+def lifted(text: str, history: Array, scale_m: float) -> tuple[Dictionary, Array]:
     psi = dictionary_from_text(text)
-    return psi, psi(np.array(history).T / scale_m).T
+    rows: Array = psi(np.array(history).T / scale_m).T
+    return psi, rows
 
 
 @pytest.mark.parametrize("text", DICTIONARIES)
 @pytest.mark.parametrize(("window", "forgetting"), [(0, 1.0), (0, 0.8), (7, 1.0)])
-def test_edmd_is_the_batch_ridge_fit_towards_persistence(text, window, forgetting):
+def test_edmd_is_the_batch_ridge_fit_towards_persistence(text: str, window: int, forgetting: float) -> None:
     rng = np.random.default_rng(1)
     history = rng.normal((0.01, 0.05), (0.01, 0.02), (20, 2))
     p = EdmdParameters(dictionary=text, prior=0.3, window=window, forgetting=forgetting)
@@ -158,11 +163,11 @@ def test_edmd_is_the_batch_ridge_fit_towards_persistence(text, window, forgettin
         prior_k=np.eye(psi.size),
         window=window or None,
     )
-    expected = p.scale_m * (k[list(psi.state_rows)] @ rows[-1])
+    expected = p.scale_m * (k[[row for row in psi.state_rows if row is not None]] @ rows[-1])
     assert forecasts("edmd", history, edmd=p, **WIDE)[-1] == pytest.approx(expected, abs=1e-9)
 
 
-def test_edmd_finds_a_law_that_its_dictionary_holds():
+def test_edmd_finds_a_law_that_its_dictionary_holds() -> None:
     """v' = 0.02 + 0.6 v is affine: 'constant identity' has it, 'identity' alone hasn't."""
     history = [(0.0, 0.02)]
     for _ in range(25):
@@ -175,12 +180,12 @@ def test_edmd_finds_a_law_that_its_dictionary_holds():
     assert errors["constant identity"] < 1e-6 < errors["identity"]
 
 
-def test_edmd_repeats_the_last_displacement_until_its_delays_are_filled():
+def test_edmd_repeats_the_last_displacement_until_its_delays_are_filled() -> None:
     p = EdmdParameters(dictionary="delay:3")
     assert forecasts("edmd", HISTORY, edmd=p)[:3] == pytest.approx(np.array(HISTORY[:3]), abs=0.0)
 
 
-def test_diagnostics_of_edmd_name_its_observables_and_the_innovation_in_metres():
+def test_diagnostics_of_edmd_name_its_observables_and_the_innovation_in_metres() -> None:
     p = EdmdParameters(dictionary="constant monomials:2", prior=1.0)
     model = Edmd(p)
     assert model.diagnostics().innovation is None
@@ -190,6 +195,7 @@ def test_diagnostics_of_edmd_name_its_observables_and_the_innovation_in_metres()
     model.observe(np.array(HISTORY[-1]))
     diagnostics = model.diagnostics()
     assert diagnostics.innovation == pytest.approx(np.array(HISTORY[-1]) - expected, abs=1e-15)
+    assert diagnostics.notes is not None
     assert diagnostics.notes["observables"] == "1, u, v, u^2, u v, v^2"
 
 
@@ -206,11 +212,11 @@ def test_diagnostics_of_edmd_name_its_observables_and_the_innovation_in_metres()
         ("delay:1", ("u", "v", "u(t-1)", "v(t-1)")),
     ],
 )
-def test_words_become_observables_in_their_order(text, names):
+def test_words_become_observables_in_their_order(text: str, names: tuple[str, ...]) -> None:
     assert dictionary_from_text(text).names == names
 
 
-def test_rbf_is_a_grid_that_reaches_twice_the_scale():
+def test_rbf_is_a_grid_that_reaches_twice_the_scale() -> None:
     psi = dictionary_from_text("identity rbf:3")
     assert psi.size == 2 + 9
     values = psi(np.array([[2.0], [-2.0]]))[2:, 0]
@@ -237,7 +243,7 @@ def test_rbf_is_a_grid_that_reaches_twice_the_scale():
         ("identity rbf:11", "takes a number from 1 to 10"),
     ],
 )
-def test_wrong_words_are_refused_in_a_sentence(text, said):
+def test_wrong_words_are_refused_in_a_sentence(text: str, said: str) -> None:
     for make in (dictionary_from_text, lambda words: predictor("edmd", edmd=EdmdParameters(dictionary=words))):
         with pytest.raises(ParameterError) as refused:
             make(text)
@@ -245,7 +251,7 @@ def test_wrong_words_are_refused_in_a_sentence(text, said):
         assert "\n" not in str(refused.value)
 
 
-def test_a_dictionary_that_is_not_used_is_not_looked_at():
+def test_a_dictionary_that_is_not_used_is_not_looked_at() -> None:
     for name in NAMES:
         if not name.startswith("edmd"):
             predictor(name, edmd=EdmdParameters(dictionary="nonsense"))

@@ -1,12 +1,17 @@
 """Conformance: what every predictor owes its users, whatever it is shown."""
 
+import itertools
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from predictor_helpers import HISTORY, forecasts, predictor, timesteps
+from cases import case
+from predictor_helpers import HISTORY, Timestep, forecasts, predictor, timesteps
 from robot_formation.koopman.predictors import DESCRIPTIONS, MODELS, NAMES, PredictionError, PredictorParameters
+from robot_formation.koopman.predictors.predictor import Forecast
 from robot_formation.parameters import specs
 
 pytestmark = pytest.mark.slow
@@ -17,24 +22,24 @@ CLOSING = [name for name in NAMES if name.endswith("+close") or name == "formati
 
 
 @pytest.fixture(params=NAMES)
-def name(request):
-    return request.param
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
 
 
-def test_the_choices_of_the_parameter_are_the_models_there_are_and_those_with_closing():
+def test_the_choices_of_the_parameter_are_the_models_there_are_and_those_with_closing() -> None:
     assert set(specs(PredictorParameters)["name"].choices) == set(NAMES) == set(DESCRIPTIONS)
     assert {name.removesuffix("+close") for name in NAMES} == set(MODELS)
     assert len(set(NAMES)) == len(NAMES) == 12
 
 
-def test_a_misspelt_predictor_is_refused_with_the_near_name():
+def test_a_misspelt_predictor_is_refused_with_the_near_name() -> None:
     with pytest.raises(PredictionError, match="no predictor 'mesured'; did you mean 'measured'"):
         predictor("mesured")
     with pytest.raises(PredictionError, match="no predictor 'literal\\+close'"):
         predictor("literal+close")
 
 
-def test_nothing_can_be_predicted_from_nothing(name):
+def test_nothing_can_be_predicted_from_nothing(name: str) -> None:
     with pytest.raises(PredictionError, match="no displacement was observed yet"):
         predictor(name).predict()
 
@@ -42,29 +47,29 @@ def test_nothing_can_be_predicted_from_nothing(name):
 # --- forecasts that need no knowledge of the model ------------------------------------------------------------------
 
 
-def test_without_residuals_the_first_forecast_is_the_first_displacement(name):
+def test_without_residuals_the_first_forecast_is_the_first_displacement(name: str) -> None:
     assert forecasts(name, [(0.013, 0.05)])[0] == pytest.approx([0.013, 0.05], abs=1e-15)
 
 
 @pytest.mark.parametrize("name", CLOSING)
-def test_with_residuals_the_first_forecast_lies_between_the_leaders_step_and_what_was_seen(name):
+def test_with_residuals_the_first_forecast_lies_between_the_leaders_step_and_what_was_seen(name: str) -> None:
     found = predictor(name)
     found.observe(np.array([0.0, 0.06]), np.zeros(2))
     assert found.predict().mean[0] == pytest.approx(0.0, abs=1e-15)
     assert 0.05 < found.predict().mean[1] < 0.06
 
 
-def test_a_constant_displacement_is_forecast_to_stay(name):
+def test_a_constant_displacement_is_forecast_to_stay(name: str) -> None:
     history = [(0.013, 0.05)] * 40
     assert forecasts(name, history) == pytest.approx(np.array(history), abs=1e-12)
 
 
-def test_a_robot_that_stands_is_forecast_to_stand(name):
+def test_a_robot_that_stands_is_forecast_to_stand(name: str) -> None:
     assert forecasts(name, [(0.0, 0.0)] * 40) == pytest.approx(np.zeros((40, 2)), abs=1e-12)
 
 
 @pytest.mark.parametrize("name", CLOSING)
-def test_a_constant_displacement_that_leaves_no_residual_is_found(name):
+def test_a_constant_displacement_that_leaves_no_residual_is_found(name: str) -> None:
     found = predictor(name)
     for _ in range(40):
         found.observe(np.array([0.013, 0.047]), np.zeros(2), np.array([0.013, 0.047]))
@@ -72,17 +77,16 @@ def test_a_constant_displacement_that_leaves_no_residual_is_found(name):
     assert found.predict().command == pytest.approx([0.013, 0.047], abs=1e-4)
 
 
-@pytest.mark.parametrize(("u", "v"), [(0.0, 0.05), (0.05, 0.0), (0.013, -0.05)])
-def test_displacements_along_one_line_are_forecast_on_it(name, u, v):
-    history = [(u * 0.95**n, v * 0.95**n) for n in range(20)]
-    found = forecasts(name, history)
-    assert found[:, 0] * v == pytest.approx(found[:, 1] * u, abs=1e-12)
+def test_displacements_along_one_line_are_forecast_on_it(name: str) -> None:
+    for u, v in ((0.0, 0.05), (0.05, 0.0), (0.013, -0.05)):
+        found = forecasts(name, [(u * 0.95**n, v * 0.95**n) for n in range(20)])
+        assert found[:, 0] * v == pytest.approx(found[:, 1] * u, abs=1e-12), (u, v)
 
 
 # --- bounds ---------------------------------------------------------------------------------------------------------
 
 
-def check(forecast):
+def check(forecast: Forecast) -> None:
     for mean in (forecast.mean, forecast.command):
         assert mean.shape == (2,)
         assert np.isfinite(mean).all()
@@ -93,7 +97,7 @@ def check(forecast):
         assert np.linalg.eigvalsh(covariance).min() >= -1e-12
 
 
-def pairs(u, v):
+def pairs(u: float, v: float) -> st.SearchStrategy[Any]:
     return st.tuples(st.floats(-u, u), st.floats(-v, v)).map(np.array)
 
 
@@ -105,12 +109,13 @@ def pairs(u, v):
     )
 )
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("forgetting", [1.0, 0.7])
-def test_forecasts_are_finite_and_bounded_and_their_covariance_is_one(name, forgetting, history):
-    found = predictor(name, forgetting=forgetting)
-    for timestep in history:
-        found.observe(*timestep)
-        check(found.predict())
+def test_forecasts_are_finite_and_bounded_and_their_covariance_is_one(name: str, history: list[Timestep]) -> None:
+    for forgetting in (1.0, 0.7):
+        found = predictor(name, forgetting=forgetting)
+        for timestep in history:
+            found.observe(*timestep)
+            with case("forgetting", forgetting):
+                check(found.predict())
 
 
 KINDS = {
@@ -125,28 +130,28 @@ KINDS = {
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("where", ["displacement", "residual", "commanded", "all"])
-def test_awkward_histories_give_bounded_forecasts(name, kind, where):
-    found = predictor(name)
-    for odd, usual in zip(KINDS[kind], timesteps(60), strict=True):
-        odd = np.array(odd)
-        x, r, c = usual
-        x, r, c = (odd if where in (part, "all") else value for part, value in zip(PARTS, (x, r, c), strict=True))
-        found.observe(x, r, c)
-        check(found.predict())
-        found.diagnostics()
+def test_awkward_histories_give_bounded_forecasts(name: str) -> None:
+    for kind, replaced in itertools.product(KINDS, [*((part,) for part in PARTS), PARTS]):
+        found = predictor(name)
+        for number, (odd, usual) in enumerate(zip(KINDS[kind], timesteps(60), strict=True)):
+            with case(kind, replaced, f"timestep {number}"):
+                x, r, c = (
+                    np.array(odd) if part in replaced else value for part, value in zip(PARTS, usual, strict=True)
+                )
+                assert x is not None
+                found.observe(x, r, c)
+                check(found.predict())
+                found.diagnostics()
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    "first", [[(1e-9, 0.0)], [(1e-200, 0.0)], [(0.0, 8e-178), (8e-178, 0.0)], [(0, 0), (0, 1e-320)]]
-)
-def test_displacements_so_small_that_their_inverse_is_huge_do_no_harm(name, first):
-    found = forecasts(name, [*first, (0.1, 0.05), (0.05, 0.1), *[(0.01, 0.05)] * 60])
-    assert (np.abs(found) <= BOUND).all()
-    if name != "literal":
-        assert found[-1] == pytest.approx([0.01, 0.05], abs=0.003)
+def test_displacements_so_small_that_their_inverse_is_huge_do_no_harm(name: str) -> None:
+    for first in ([(1e-9, 0.0)], [(1e-200, 0.0)], [(0.0, 8e-178), (8e-178, 0.0)], [(0.0, 0.0), (0.0, 1e-320)]):
+        with case(first):
+            found = forecasts(name, [*first, (0.1, 0.05), (0.05, 0.1), *[(0.01, 0.05)] * 60])
+            assert (np.abs(found) <= BOUND).all()
+            if name != "literal":
+                assert found[-1] == pytest.approx([0.01, 0.05], abs=0.003)
 
 
 # --- what is refused ------------------------------------------------------------------------------------------------
@@ -155,9 +160,13 @@ def test_displacements_so_small_that_their_inverse_is_huge_do_no_harm(name, firs
 BAD = [(np.nan, 0.05), (0.0, np.nan), (np.inf, 0.0), (0.0, -np.inf), (1.01, 0.0), (0.0, -2.01), (1e300, 0.0)]
 
 
-@pytest.mark.parametrize("part", PARTS)
-@pytest.mark.parametrize("seen", [0, 1, 3, 6])
-def test_absurd_input_is_refused_with_a_reason_and_changes_nothing(name, part, seen):
+def test_absurd_input_is_refused_with_a_reason_and_changes_nothing(name: str) -> None:
+    for part, seen in itertools.product(PARTS, (0, 1, 3, 6)):
+        with case(part, f"after {seen} timesteps"):
+            check_absurd_input(name, part, seen)
+
+
+def check_absurd_input(name: str, part: str, seen: int) -> None:
     asked, twin = predictor(name), predictor(name)
     history = timesteps(9)
     for timestep in history[:seen]:
@@ -178,7 +187,7 @@ def test_absurd_input_is_refused_with_a_reason_and_changes_nothing(name, part, s
 # --- determinism and ownership --------------------------------------------------------------------------------------
 
 
-def test_the_same_history_gives_the_same_forecasts_to_the_last_bit(name):
+def test_the_same_history_gives_the_same_forecasts_to_the_last_bit(name: str) -> None:
     found = [predictor(name), predictor(name)]
     for timestep in timesteps(30):
         for either in found:
@@ -186,10 +195,10 @@ def test_the_same_history_gives_the_same_forecasts_to_the_last_bit(name):
         assert all((a == b).all() for a, b in zip(found[0].predict(), found[1].predict(), strict=True))
 
 
-def test_what_is_handed_in_stays_as_it_is_and_is_not_kept(name):
+def test_what_is_handed_in_stays_as_it_is_and_is_not_kept(name: str) -> None:
     asked, twin = predictor(name), predictor(name)
     for x, r, c in timesteps(20):
-        mine = [None if value is None else value.copy() for value in (x, r, c)]
+        mine = (x.copy(), None if r is None else r.copy(), None if c is None else c.copy())
         asked.observe(*mine)
         for value, before in zip(mine, (x, r, c), strict=True):
             if value is not None:
@@ -199,7 +208,7 @@ def test_what_is_handed_in_stays_as_it_is_and_is_not_kept(name):
         assert (asked.predict().mean == twin.predict().mean).all()
 
 
-def test_asking_twice_changes_nothing_and_the_answer_is_the_askers(name):
+def test_asking_twice_changes_nothing_and_the_answer_is_the_askers(name: str) -> None:
     found = predictor(name)
     for timestep in timesteps(20):
         found.observe(*timestep)
@@ -213,22 +222,26 @@ def test_asking_twice_changes_nothing_and_the_answer_is_the_askers(name):
 # --- covariance -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("discount", [1.0, 0.8])
-@pytest.mark.parametrize("known", [False, True], ids=["without residuals", "with residuals"])
-def test_the_covariance_is_the_mean_square_of_the_forecasts_own_errors_and_of_sigma(name, known, discount):
+def test_the_covariance_is_the_mean_square_of_the_forecasts_own_errors_and_of_sigma(name: str) -> None:
+    for known, discount in itertools.product((False, True), (1.0, 0.8)):
+        with case("residuals known" if known else "residuals unknown", f"discount {discount}"):
+            check_covariance(name, known, discount)
+
+
+def check_covariance(name: str, known: bool, discount: float) -> None:
     found = predictor(name, sigma_u_m=0.004, sigma_v_m=0.003, sigma_weight=2.5, sigma_discount=discount)
     total, weight, expected = np.diag([0.004, 0.003]) ** 2 * 2.5, 2.5, None
     for x, r, c in timesteps(20):
-        r = r if known else None
+        seen = r if known else None
         if expected is not None:
-            error = (x if r is None else x + r) - expected  # of the ideal move, where it is known
+            error = (x if seen is None else x + seen) - expected  # of the ideal move, where it is known
             total, weight = discount * total + np.outer(error, error), discount * weight + 1.0
-        found.observe(x, r, c)
+        found.observe(x, seen, c)
         expected = found.predict().mean
         assert found.predict().covariance == pytest.approx(total / weight, abs=1e-18)
 
 
-def test_the_second_moment_about_the_command_holds_the_bias_that_was_taken_off():
+def test_the_second_moment_about_the_command_holds_the_bias_that_was_taken_off() -> None:
     found = predictor("formation")
     for timestep in timesteps(20):
         found.observe(*timestep)
@@ -244,15 +257,18 @@ def test_the_second_moment_about_the_command_holds_the_bias_that_was_taken_off()
 # --- diagnostics ------------------------------------------------------------------------------------------------
 
 
-def test_diagnostics_show_k_with_its_eigenvalues_where_there_is_one(name):
+def test_diagnostics_show_k_with_its_eigenvalues_where_there_is_one(name: str) -> None:
     found = predictor(name)
     for x in HISTORY:
         found.observe(np.array(x))
     diagnostics = found.diagnostics()
     size = {"measured": 2, "literal": 2, "edmd": 3, "formation": 3}.get(name.removesuffix("+close"))
     if size is None:
-        assert diagnostics.k is diagnostics.eigenvalues is diagnostics.condition_number is None
+        assert (diagnostics.k, diagnostics.eigenvalues, diagnostics.condition_number) == (None, None, None)
         return
+    assert diagnostics.k is not None
+    assert diagnostics.eigenvalues is not None
+    assert diagnostics.condition_number is not None
     assert diagnostics.k.shape == (size, size)
     assert np.sum(diagnostics.eigenvalues).real == pytest.approx(np.trace(diagnostics.k))
     assert np.prod(diagnostics.eigenvalues).real == pytest.approx(np.linalg.det(diagnostics.k))
@@ -263,11 +279,12 @@ def test_diagnostics_show_k_with_its_eigenvalues_where_there_is_one(name):
 
 
 @pytest.mark.parametrize("name", CLOSING)
-def test_diagnostics_show_residual_and_bias_of_those_that_close_them(name):
+def test_diagnostics_show_residual_and_bias_of_those_that_close_them(name: str) -> None:
     found = predictor(name)
     for timestep in timesteps(10):
         found.observe(*timestep)
     notes = found.diagnostics().notes
+    assert notes is not None
     assert {"residual [m]", "actuation bias [m]"} <= set(notes)
     bias = found.predict().mean - found.predict().command
     assert notes["actuation bias [m]"] == np.array2string(bias, precision=6, separator=", ")

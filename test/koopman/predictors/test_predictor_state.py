@@ -2,18 +2,24 @@
 
 import copy
 import json
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
+from cases import case
 from predictor_helpers import predictor, timesteps
 from robot_formation.errors import FormationError
 from robot_formation.koopman.predictors import NAMES, PredictionError, Predictor, PredictorParameters
 from robot_formation.koopman.predictors.parameters import ClosingParameters, EdmdParameters, FormationParameters
 
+Path = tuple[int | str, ...]
+"""Keys and indices that lead to a value in nested mappings and lists."""
+
 pytestmark = pytest.mark.slow
 
-VARIANTS = {
+VARIANTS: dict[str, dict[str, Any]] = {
     **{name: {"name": name} for name in NAMES},
     "edmd, windowed": {"name": "edmd", "edmd": EdmdParameters(window=5, forgetting=0.9)},
     "edmd+close, delayed": {"name": "edmd+close", "edmd": EdmdParameters(dictionary="constant delay:3")},
@@ -26,25 +32,30 @@ VARIANTS = {
 
 
 @pytest.fixture(params=VARIANTS)
-def values(request):
+def values(request: pytest.FixtureRequest) -> dict[str, Any]:
     return VARIANTS[request.param]
 
 
-def shown(values, count):
+def shown(values: dict[str, Any], count: int) -> Predictor:
     found = predictor(**values)
     for timestep in timesteps(count):
         found.observe(*timestep)
     return found
 
 
-def diagnostics(found):
+def diagnostics(found: Predictor) -> tuple[Any, ...]:
     seen = found.diagnostics()
     arrays = [None if part is None else part.tolist() for part in (seen.k, seen.innovation)]
     return arrays, seen.condition_number, seen.notes
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 12, 40])
-def test_json_and_back_goes_on_to_the_last_bit(values, count):
+def test_json_and_back_goes_on_to_the_last_bit(values: dict[str, Any]) -> None:
+    for count in (0, 1, 2, 3, 4, 12, 40):
+        with case(f"after {count} timesteps"):
+            check_json_and_back(values, count)
+
+
+def check_json_and_back(values: dict[str, Any], count: int) -> None:
     one = shown(values, count)
     text = json.dumps(one.state(), allow_nan=False)
     other = Predictor.from_state(PredictorParameters(**values), json.loads(text))
@@ -60,7 +71,7 @@ def test_json_and_back_goes_on_to_the_last_bit(values, count):
     assert diagnostics(one) == diagnostics(other)
 
 
-def test_a_state_is_of_the_moment_when_it_was_taken(values):
+def test_a_state_is_of_the_moment_when_it_was_taken(values: dict[str, Any]) -> None:
     found = shown(values, 10)
     state = found.state()
     before = copy.deepcopy(state)
@@ -69,15 +80,17 @@ def test_a_state_is_of_the_moment_when_it_was_taken(values):
     assert state == before
 
 
-def paths(value, path=()):
+def paths(value: Any, path: Path = ()) -> Iterator[Path]:
     """Every place in nested lists and mappings."""
     yield path
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    items: Iterable[tuple[int | str, Any]] = (
+        value.items() if isinstance(value, dict) else enumerate(value if isinstance(value, list) else ())
+    )
     for key, inner in items:
         yield from paths(inner, (*path, key))
 
 
-def damaged(state, path, wrong):
+def damaged(state: Any, path: Path, wrong: Any) -> Any:
     found = copy.deepcopy(state)
     if not path:
         return wrong
@@ -91,8 +104,14 @@ def damaged(state, path, wrong):
     return found
 
 
-@pytest.mark.parametrize("wrong", [None, float("nan"), float("inf"), "text", [], {}, [[1.0]], -1, "missing"], ids=str)
-def test_a_damaged_state_is_refused_in_a_sentence_or_does_no_harm(values, wrong):
+def test_a_damaged_state_is_refused_in_a_sentence_or_does_no_harm(values: dict[str, Any]) -> None:
+    wrong: Any
+    for wrong in (None, float("nan"), float("inf"), "text", [], {}, [[1.0]], -1, "missing"):
+        with case(repr(wrong)):
+            check_damaged_states(values, wrong)
+
+
+def check_damaged_states(values: dict[str, Any], wrong: Any) -> None:
     parameters = PredictorParameters(**values)
     state = shown(values, 6).state()
     refusals = []
@@ -112,11 +131,11 @@ def test_a_damaged_state_is_refused_in_a_sentence_or_does_no_harm(values, wrong)
         assert "\n" not in text
 
 
-def test_nothing_that_is_not_finite_gets_in(values):
+def test_nothing_that_is_not_finite_gets_in(values: dict[str, Any]) -> None:
     parameters = PredictorParameters(**values)
     state = shown(values, 6).state()
     for path in paths(state):
-        place = state
+        place: Any = state
         for key in path:
             place = place[key]
         if isinstance(place, float):
@@ -140,7 +159,7 @@ def test_nothing_that_is_not_finite_gets_in(values):
         ),
     ],
 )
-def test_a_state_of_another_predictor_is_refused(learned, asked, said):
+def test_a_state_of_another_predictor_is_refused(learned: dict[str, str], asked: dict[str, Any], said: str) -> None:
     state = shown(learned, 5).state()
     with pytest.raises(FormationError) as refused:
         Predictor.from_state(PredictorParameters(**asked), state)

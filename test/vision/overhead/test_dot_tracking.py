@@ -2,9 +2,12 @@
 
 import itertools
 import math
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -19,12 +22,16 @@ from robot_formation.world.overhead import OverheadCamera
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import pose_on_surface
 
+Array = npt.NDArray[np.float64]
+
 BOWL, PLANE = make_surface("bowl"), make_surface("plane")
 RADIUS_PX = 3.8
 AREA_PX = math.pi * RADIUS_PX**2
 
 
-def dots_picture(centres, radius=RADIUS_PX, size=512):
+def dots_picture(
+    centres: Sequence[tuple[float, float]] | Array, radius: float = RADIUS_PX, size: int = 512
+) -> npt.NDArray[np.uint8]:
     """Grey 20 with white discs, each pixel by the share that a disc covers (8 x 8 samples)."""
     picture = np.full((size, size), 20.0)
     fine = (np.arange(8) + 0.5) / 8 - 0.5
@@ -39,7 +46,8 @@ def dots_picture(centres, radius=RADIUS_PX, size=512):
         inside = (dx[None] ** 2 + dy[:, None] ** 2 <= radius**2).reshape(len(rows), 8, len(columns), 8)
         part = picture[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         part[...] = np.maximum(part, 20.0 + 200.0 * inside.mean(axis=(1, 3)))
-    return np.rint(picture).astype(np.uint8)
+    whole: npt.NDArray[np.uint8] = np.rint(picture).astype(np.uint8)
+    return whole
 
 
 # --- finding dots -------------------------------------------------------------------------------------------------
@@ -47,14 +55,14 @@ def dots_picture(centres, radius=RADIUS_PX, size=512):
 
 @given(st.floats(20, 490), st.floats(20, 490))
 @settings(max_examples=25, deadline=None)
-def test_a_dots_centre_is_found_to_a_twentieth_of_a_pixel(column, row):
+def test_a_dots_centre_is_found_to_a_twentieth_of_a_pixel(column: float, row: float) -> None:
     (found,) = find_dots(dots_picture([(column, row)]), 120, AREA_PX)
     assert found == pytest.approx((column, row), abs=0.05)
 
 
 @pytest.mark.parametrize("gap", [-0.5, 0.0, 1.0, 3.0])
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
-def test_dots_that_touch_are_told_apart(gap, angle):
+def test_dots_that_touch_are_told_apart(gap: float, angle: float) -> None:
     half = (RADIUS_PX + 0.5 * gap) * np.array([math.cos(angle), math.sin(angle)])
     middle = np.array([200.3, 150.6])
     centres = np.array([middle - half, middle + half])
@@ -64,19 +72,19 @@ def test_dots_that_touch_are_told_apart(gap, angle):
         assert np.linalg.norm(found - centre, axis=1).min() < 0.4
 
 
-def test_three_dots_in_a_row_that_touch_are_three():
+def test_three_dots_in_a_row_that_touch_are_three() -> None:
     centres = np.array([(100.0 + 7.6 * k, 80.0) for k in range(3)])
     found = find_dots(dots_picture(centres), 120, AREA_PX)
     assert found[np.argsort(found[:, 0])] == pytest.approx(centres, abs=0.5)
 
 
-def test_dots_cut_off_by_the_edge_or_mostly_covered_are_not_reported():
+def test_dots_cut_off_by_the_edge_or_mostly_covered_are_not_reported() -> None:
     picture = dots_picture([(1.0, 200.0), (300.0, 510.0), (100.0, 100.0), (250.0, 250.0)])
     picture[:, 98:110] = 20
     assert find_dots(picture, 120, AREA_PX) == pytest.approx(np.array([[250.0, 250.0]]), abs=0.05)
 
 
-def test_noise_and_an_empty_picture_give_no_dots():
+def test_noise_and_an_empty_picture_give_no_dots() -> None:
     noise = np.random.default_rng(0).normal(60, 20, (512, 512)).clip(0, 255).astype(np.uint8)
     for picture in (noise, np.zeros((512, 512), np.uint8), np.full((512, 512), 255, np.uint8)):
         assert find_dots(picture, 150, AREA_PX).shape == (0, 2)
@@ -86,19 +94,20 @@ def test_noise_and_an_empty_picture_give_no_dots():
 
 
 @pytest.mark.parametrize("surface", ["bowl", "plane", "saddle", "gaussian_bump"])
-def test_a_dots_place_follows_from_its_pixel_where_surface_and_lens_are_known(surface):
+def test_a_dots_place_follows_from_its_pixel_where_surface_and_lens_are_known(surface: str) -> None:
     ground = make_surface(surface)
     camera = OverheadCamera(ground, WorldParameters(), 0)
     locator = Locator(Calibration(), ground, 0.216)
     generator = np.random.default_rng(5)
     for _ in range(30):
-        pose = pose_on_surface(ground, *generator.uniform(0.1, 1.68, 2), generator.uniform(-3, 3))
+        x, y = generator.uniform(0.1, 1.68, 2)
+        pose = pose_on_surface(ground, x, y, generator.uniform(-3, 3))
         dot = np.array(pose.position) + pose.matrix() @ [0.0, 0.0, 0.216]
         (place,) = locator.places(camera.project(dot[None]))
         assert place == pytest.approx(dot, abs=1.5e-3)
 
 
-def test_undistortion_inverts_opencvs_projection():
+def test_undistortion_inverts_opencvs_projection() -> None:
     """On a plane at the camera's own model nothing but undistortion is left."""
     flat = Calibration(knows_surface=False, plane_m=0.3)
     points = np.random.default_rng(6).uniform(0, 1.78, (40, 2))
@@ -107,10 +116,10 @@ def test_undistortion_inverts_opencvs_projection():
     matrix = np.array([[560.0, 0, 257.3], [0, 560.0, 254.1], [0, 0, 1]])
     coefficients = np.array([-0.12, 0.02, 0.0006, -0.0004, 0.0])
     pixels, _ = cv2.projectPoints(local, np.zeros(3), np.zeros(3), matrix, coefficients)
-    assert Locator(flat, PLANE, 0.216).places(pixels.reshape(-1, 2)) == pytest.approx(places, abs=1e-6)
+    assert Locator(flat, PLANE, 0.216).places(pixels.reshape(-1, 2).astype(float)) == pytest.approx(places, abs=1e-6)
 
 
-def test_the_imperfect_calibration_errs_by_centimetres_as_the_papers():
+def test_the_imperfect_calibration_errs_by_centimetres_as_the_papers() -> None:
     camera = OverheadCamera(BOWL, WorldParameters(), 0)
     locator = Locator(ImperfectCalibration(), BOWL, 0.216)
     grid = [pose_on_surface(BOWL, x, y, 0.0) for x in np.linspace(0.2, 1.6, 8) for y in np.linspace(0.2, 1.6, 8)]
@@ -128,7 +137,7 @@ def test_the_imperfect_calibration_errs_by_centimetres_as_the_papers():
     )
 )
 @settings(max_examples=60, deadline=None)
-def test_the_assignment_is_the_cheapest_of_all(costs):
+def test_the_assignment_is_the_cheapest_of_all(costs: Array) -> None:
     rows, columns = costs.shape
     found = assign(costs, 1.0)
     taken = [column for column in found if column is not None]
@@ -136,7 +145,7 @@ def test_the_assignment_is_the_cheapest_of_all(costs):
     assert all(column is None or costs[row, column] <= 1.0 for row, column in enumerate(found))
     paid = sum(1.0 if column is None else costs[row, column] for row, column in enumerate(found))
 
-    def price(row, column):
+    def price(row: int, column: int) -> float:
         return 1.0 if column >= columns else costs[row, column] if costs[row, column] <= 1.0 else math.inf
 
     choices = itertools.permutations(range(columns + rows), rows)
@@ -151,11 +160,13 @@ FLAT = {"k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0.0, "knows_surface": False}
 PX_PER_M = 560.0 / (2.5 - 0.216)
 
 
-def pixel(x, y):
+def pixel(x: float, y: float) -> tuple[float, float]:
     return 257.3 + (x - 0.89) * PX_PER_M, 254.1 - (y - 0.89) * PX_PER_M
 
 
-def follow(paths, hidden=lambda name, frame: False, **values):
+def follow(
+    paths: dict[str, Array], hidden: Callable[[str, int], bool] = lambda name, frame: False, **values: Any
+) -> tuple[OverheadTracker, dict[str, Array]]:
     """Track robots along paths (frames, 2); returns the tracker after checking every place against its own path."""
     parameters = from_mapping(OverheadTrackingParameters, {"good": FLAT, **values}, where="test")
     tracker = OverheadTracker(parameters, PLANE, {name: path[0] for name, path in paths.items()})
@@ -167,11 +178,11 @@ def follow(paths, hidden=lambda name, frame: False, **values):
     return tracker, found
 
 
-def line(start, end, frames):
+def line(start: tuple[float, float], end: tuple[float, float], frames: int) -> Array:
     return np.linspace(start, end, frames)
 
 
-def test_dots_that_touch_while_they_pass_keep_their_names():
+def test_dots_that_touch_while_they_pass_keep_their_names() -> None:
     side = RADIUS_PX / PX_PER_M
     paths = {
         "leader": line((0.6, 0.9 + side), (1.2, 0.9 + side), 41),
@@ -180,14 +191,14 @@ def test_dots_that_touch_while_they_pass_keep_their_names():
     assert set(follow(paths)[1]) == set(paths)
 
 
-def test_dots_that_touch_and_part_again_keep_their_names():
+def test_dots_that_touch_and_part_again_keep_their_names() -> None:
     near = 1.95 * RADIUS_PX / PX_PER_M
     distance = np.concatenate([np.linspace(0.3, near, 20), np.full(10, near), np.linspace(near, 0.3, 20)])
     one = np.column_stack([0.9 - distance / 2, np.full(50, 0.7)])
     assert set(follow({"a": one, "b": one * (-1, 1) + (1.8, 0)})[1]) == {"a", "b"}
 
 
-def test_a_dot_that_leaves_the_picture_and_comes_back_is_the_same_robots():
+def test_a_dot_that_leaves_the_picture_and_comes_back_is_the_same_robots() -> None:
     out_and_back = np.concatenate([line((1.5, 0.9), (2.1, 0.9), 15), line((2.1, 0.9), (1.5, 0.9), 15)])
     other = np.concatenate([line((1.2, 0.9), (1.6, 0.9), 15), line((1.6, 0.9), (1.2, 0.9), 15)])
     tracker, found = follow({"leader": other, "follower_1": out_and_back})
@@ -196,13 +207,13 @@ def test_a_dot_that_leaves_the_picture_and_comes_back_is_the_same_robots():
 
 
 @pytest.mark.parametrize("covered", [("leader",), ("follower_1",), ("leader", "follower_1")])
-def test_dots_that_are_covered_while_they_drive_keep_their_names(covered):
+def test_dots_that_are_covered_while_they_drive_keep_their_names(covered: tuple[str, ...]) -> None:
     paths = {"leader": line((0.76, 0.2), (0.76, 1.15), 20), "follower_1": line((1.08, 0.2), (1.08, 1.15), 20)}
     _, found = follow(paths, hidden=lambda name, frame: name in covered and 6 <= frame < 12)
     assert set(found) == set(paths)
 
 
-def test_stop_and_go_of_a_formation_keeps_names_through_covers_and_long_moves():
+def test_stop_and_go_of_a_formation_keeps_names_through_covers_and_long_moves() -> None:
     """Moves of up to 20 cm, one robot at a time, dots hidden at random: as in a run, and worse."""
     generator = np.random.default_rng(8)
     names = ["leader", "follower_1", "follower_2"]
@@ -221,7 +232,7 @@ def test_stop_and_go_of_a_formation_keeps_names_through_covers_and_long_moves():
     assert set(found) == {"a", "b"}
 
 
-def test_a_hidden_robots_place_is_its_last_and_no_other_dot_is_taken_for_it():
+def test_a_hidden_robots_place_is_its_last_and_no_other_dot_is_taken_for_it() -> None:
     paths = {"leader": np.full((12, 2), 0.6), "follower_1": np.full((12, 2), (0.92, 0.6))}
     tracker, found = follow(paths, hidden=lambda name, frame: name == "leader" and frame > 3)
     assert set(found) == {"follower_1"}
@@ -229,14 +240,14 @@ def test_a_hidden_robots_place_is_its_last_and_no_other_dot_is_taken_for_it():
     assert tracker.tracks["leader"].place[:2] == pytest.approx((0.6, 0.6), abs=1e-3)
 
 
-def test_ten_robots_are_followed():
+def test_ten_robots_are_followed() -> None:
     start = {f"robot_{n}": np.array([0.3 + 0.28 * (n % 5), 0.5 + 0.5 * (n // 5)]) for n in range(10)}
     steps = np.cumsum(np.random.default_rng(9).uniform(-0.02, 0.02, (10, 25, 2)), axis=1)
     _, found = follow({name: place + steps[n] for n, (name, place) in enumerate(start.items())})
     assert len(found) == 10
 
 
-def test_restart_expects_the_starts_again():
+def test_restart_expects_the_starts_again() -> None:
     path = line((0.5, 0.5), (1.3, 0.5), 30)
     tracker, _ = follow({"leader": path})
     tracker.restart()
@@ -244,7 +255,7 @@ def test_restart_expects_the_starts_again():
     assert found["leader"][:2] == pytest.approx((0.5, 0.5), abs=1e-3)
 
 
-def test_robots_that_are_put_back_to_their_starts_are_found_there_at_once():
+def test_robots_that_are_put_back_to_their_starts_are_found_there_at_once() -> None:
     paths = {"leader": line((0.4, 0.4), (1.4, 0.4), 30), "follower_1": line((0.4, 0.7), (0.4, 1.5), 30)}
     tracker, _ = follow(paths)
     assert not tracker.restarted
@@ -257,7 +268,7 @@ def test_robots_that_are_put_back_to_their_starts_are_found_there_at_once():
     assert not tracker.restarted
 
 
-def test_another_threshold_and_calibration_count_from_the_next_picture_on_and_tracks_go_on():
+def test_another_threshold_and_calibration_count_from_the_next_picture_on_and_tracks_go_on() -> None:
     tracker, _ = follow({"leader": line((0.5, 0.5), (0.9, 0.5), 20)})
     starts = {"leader": (0.5, 0.5)}
     tracker.configure(
