@@ -69,7 +69,7 @@ class Timestep:
         """Length of the formation error, metres."""
         return math.hypot(*self.error_uv_m) if self.error_uv_m is not None else None
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> JsonObject:
         """Return the timestep as the command line's JSON has it."""
         return {
             "t": self.t,
@@ -100,7 +100,7 @@ class FollowerAnalysis:
     unfinished: Corrections | None
     totals: JsonObject
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> JsonObject:
         """Return the timesteps and totals as the command line's JSON has them."""
         return {"timesteps": [timestep.to_json() for timestep in self.timesteps], "totals": self.totals}
 
@@ -113,7 +113,7 @@ class RunAnalysis:
     outcome: str
     followers: tuple[FollowerAnalysis, ...]
 
-    def to_json(self) -> dict[str, object]:
+    def to_json(self) -> JsonObject:
         """Return the command line's JSON: the first follower's, and each one's where there are several."""
         result = {"scenario": self.scenario, "outcome": self.outcome, **self.followers[0].to_json()}
         if len(self.followers) > 1:
@@ -171,7 +171,7 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
     return FollowerAnalysis(follower.name, follower.lost, timesteps, unfinished, values)
 
 
-def totals(timesteps: Sequence[Timestep]) -> dict[str, object]:
+def totals(timesteps: Sequence[Timestep]) -> JsonObject:
     """Sum up timesteps: correction distances from timestep 4 on, movements, formation and heading errors."""
     counted = [timestep.corrections for timestep in timesteps if timestep.t > COLLECTION_TIMESTEPS]
     u_m = sum(correction.u_m for correction in counted)

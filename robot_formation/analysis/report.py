@@ -147,7 +147,7 @@ def _correction(values: JsonObject) -> str:
     return f"{both} cm (u {u}, v {v}), turns {_scaled(values['correction_turn_rad'], math.degrees(1.0))} deg"
 
 
-def _movements(values: dict[str, object]) -> str:
+def _movements(values: JsonObject) -> str:
     per_timestep = values["movements_per_timestep"]
     return f"{values['movements']}{'' if per_timestep is None else f' ({per_timestep:.2f} per timestep)'}"
 

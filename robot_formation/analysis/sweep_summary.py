@@ -60,7 +60,7 @@ class RunRow(Protocol):
         """Share of timesteps inside the prediction's 90 % ellipse."""
 
 
-def summarise(rows: Sequence[RunRow]) -> list[dict[str, object]]:
+def summarise(rows: Sequence[RunRow]) -> list[JsonObject]:
     """Summarise runs by track, surface and predictor, in order of appearance; None where nothing is known."""
     groups: dict[tuple[str, str, str], dict[int, RunRow]] = {}
     for row in rows:

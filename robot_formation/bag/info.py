@@ -12,6 +12,7 @@ from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.run_details import value
+from robot_formation.json_values import JsonObject
 from robot_formation.system.files import size_text
 
 _DETAILS = ("scenario", "seed", "predictor", "surface", "git_commit", "dropped", "lost")
@@ -66,7 +67,7 @@ class BagInfo:
             return False
         return True if "scenario" in self.details else None
 
-    def to_mapping(self) -> dict[str, object]:
+    def to_mapping(self) -> JsonObject:
         """Return what `--json` prints."""
         return {
             "bag": str(self.path),
@@ -141,7 +142,7 @@ def info_text(info: BagInfo) -> str:
     return "\n".join(lines)
 
 
-def _topic(topic: TopicSummary) -> dict[str, object]:
+def _topic(topic: TopicSummary) -> JsonObject:
     return {
         "name": topic.name,
         "type": topic.type_name,

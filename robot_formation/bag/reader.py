@@ -22,6 +22,7 @@ from robot_formation.bag.metadata import TopicSummary
 from robot_formation.bag.source import RawMessage, Source
 from robot_formation.bag.sqlite_source import SqliteSource
 from robot_formation.errors import shown
+from robot_formation.names import Message
 
 _LOG = logging.getLogger(__name__)
 _IDL_FILE = "=" * 80 + "\n"
@@ -33,7 +34,7 @@ class BagMessage(NamedTuple):
     topic: str
     type_name: str
     stamp_ns: int
-    message: object
+    message: Message
 
 
 class Bag:

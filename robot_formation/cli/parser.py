@@ -126,5 +126,5 @@ def _path(text: str) -> Path:
     return Path(text)
 
 
-Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"
+Subparsers: TypeAlias = "argparse._SubParsersAction[Any]"
 """What argparse returns for adding verbs."""
