@@ -13,7 +13,7 @@ from robot_formation.world.events import BodyState
 from robot_formation.world.imperfections import Imperfections
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
-from robot_formation.world.wheel import DRIVING, HELD, Wheel
+from robot_formation.world.wheel_motor import DRIVING, HELD, Wheel
 
 HALF_ROOT = math.sqrt(0.5)
 ROLLER_DRAG_SPEED = 0.005

@@ -14,7 +14,7 @@ from robot_formation.world.imperfections import draw_imperfections, generator
 from robot_formation.world.parameters import DriveMode, WorldParameters
 from robot_formation.world.pose import Pose
 from robot_formation.world.start import RobotStart
-from robot_formation.world.wheel import HELD
+from robot_formation.world.wheel_motor import HELD
 
 SETTLING_ROUNDS = 4
 
