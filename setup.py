@@ -55,6 +55,7 @@ setup(
         "pybullet>=3.2.6",
         "rosbags>=0.11.6",
         "scipy>=1.11.4",
+        "setproctitle>=1.3.3",
         "zstandard>=0.22.0",
     ],
     extras_require={

@@ -28,7 +28,6 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -137,8 +136,8 @@ class Command:
         for pid in descendants(self.process.pid):
             self.pids.add(pid)
             with contextlib.suppress(OSError):
-                command = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
-                kind = next((name for part, name in pairwise(command) if part == "robot_formation.nodes"), None)
+                command = Path(f"/proc/{pid}/cmdline").read_bytes().decode().replace("\0", " ").split()
+                kind = command[1] if command[:1] == ["robot_formation"] else None
                 space = next((part for part in command if part.startswith("__ns:=")), "__ns:=/")
                 if kind is not None:
                     found[f"{space.removeprefix('__ns:=').rstrip('/')}/{kind}"] = pid

@@ -2,53 +2,37 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import re
 import signal
-import subprocess
-import sys
-from collections.abc import Mapping
 from pathlib import Path
 
 import yaml
 
 from robot_formation.experiment.run_result import NodeUsage
+from robot_formation.launching.fork_server import ForkServer
 from robot_formation.launching.outcome import manner
 from robot_formation.launching.processes import Process
 
-_PR_SET_PDEATHSIG = 1
 _LOG_LINE = re.compile(r"\[(?P<level>INFO|WARN|ERROR|FATAL)\] \[[\d.]+\] \[(?P<node>[^\]]+)\]: (?P<text>.*)")
 
 
-def _die_with_parent() -> None:
-    """Ask Linux to end this process in good order when its launcher dies, however that happens."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-
-
 class Child:
-    """Starts a process of the table with its parameters in a file; output goes to a log in `folder`."""
+    """Starts a process of the table with its parameters in a file; output goes to a log in `folder`.
 
-    def __init__(self, process: Process, folder: Path, environment: Mapping[str, str]) -> None:
+    Attributes:
+        pid: the process id.
+    """
+
+    def __init__(self, process: Process, folder: Path, server: ForkServer) -> None:
         self.process = process
         stem = process.name.strip("/").replace("/", "_")
         self._log = folder / f"{stem}.log"
         parameters = folder / f"{stem}.yaml"
         content = {"/**": {"ros__parameters": process.ros_parameters()}}
         parameters.write_text(yaml.safe_dump(content), encoding="utf-8")
-        command = [sys.executable, "-m", "robot_formation.nodes", process.executable, "--ros-args"]
-        command += ["-r", f"__ns:={process.namespace}", "--params-file", str(parameters)]
-        with self._log.open("wb") as log:
-            self._popen = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                env=dict(environment),
-                # Ctrl-C in the terminal is for the launcher, which ends the nodes in order.
-                start_new_session=True,
-                preexec_fn=_die_with_parent,
-            )
+        arguments = ["--ros-args", "-r", f"__ns:={process.namespace}", "--params-file", str(parameters)]
+        self.pid = server.start(process.executable, arguments, self._log)
         self.exit_code: int | None = None
         self.forced = False
         self.usage: NodeUsage | None = None
@@ -61,9 +45,9 @@ class Child:
     def poll(self) -> int | None:
         """Return the exit code (negative: the signal that killed it), None while it runs."""
         if self.exit_code is None:
-            pid, status, used = os.wait4(self._popen.pid, os.WNOHANG)
+            pid, status, used = os.wait4(self.pid, os.WNOHANG)
             if pid:
-                self.exit_code = self._popen.returncode = os.waitstatus_to_exitcode(status)
+                self.exit_code = os.waitstatus_to_exitcode(status)
                 self.usage = NodeUsage(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0)
         return self.exit_code
 
@@ -71,12 +55,7 @@ class Child:
         """Send a signal if the process still runs; `forced` tells that it didn't end when it was asked to."""
         if self.poll() is None:
             self.forced = self.forced or number == signal.SIGKILL
-            os.kill(self._popen.pid, number)
-
-    @property
-    def pid(self) -> int:
-        """The process id."""
-        return self._popen.pid
+            os.kill(self.pid, number)
 
     @property
     def state(self) -> str:

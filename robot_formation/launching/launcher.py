@@ -19,6 +19,7 @@ from robot_formation.experiment.scenario import Scenario
 from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
+from robot_formation.launching.fork_server import ForkServer
 from robot_formation.launching.outcome import recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
@@ -110,10 +111,11 @@ class Launcher:
         return result
 
     def _start(self, table: list[Process], folder: Path, environment: dict[str, str]) -> None:
-        for process in table:
-            if self._signals.count:
-                return
-            self._children.append(Child(process, folder, environment))
+        with ForkServer(environment, folder / "fork_server.log") as server:
+            for process in table:
+                if self._signals.count:
+                    return
+                self._children.append(Child(process, folder, server))
 
     def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""

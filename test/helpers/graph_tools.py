@@ -84,7 +84,8 @@ def node_processes() -> set[int]:
     found = set()
     for entry in Path("/proc").glob("[0-9]*/cmdline"):
         try:
-            if b"robot_formation.nodes\0" in entry.read_bytes():
+            command = entry.read_bytes()
+            if b"robot_formation.nodes\0" in command or command.startswith(b"robot_formation "):
                 found.add(int(entry.parent.name))
         except OSError:
             continue

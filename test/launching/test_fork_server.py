@@ -1,0 +1,86 @@
+"""Nodes that one process forks are the launcher's own children, each with a name, a log and an end of its own."""
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from graph_tools import alive
+from robot_formation.experiment.run_result import RunError
+from robot_formation.launching.environment import node_environment
+from robot_formation.launching.fork_server import ForkServer
+from robot_formation.network.ros_domain import DomainReservation
+
+pytestmark = pytest.mark.graph
+
+WRONG = ["--ros-args", "-r", "__ns:=/leader", "-p", "nonsense:=1"]
+RIGHT = ["--ros-args", "-r", "__ns:=/leader"]
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> Iterator[dict[str, str]]:
+    with DomainReservation() as domain:
+        yield node_environment(domain, tmp_path)
+
+
+def ended(pid: int) -> int:
+    """The exit code of a child, negative for a signal; only a process's own children can be waited for."""
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+def test_a_node_ends_with_its_own_code_and_its_words_are_in_its_own_log(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    with ForkServer(environment, tmp_path / "server.log") as server:
+        pids = [server.start("drive", arguments, tmp_path / name) for name, arguments in (("a", WRONG), ("b", RIGHT))]
+    assert ended(pids[0]) == 2
+    assert "no parameter 'nonsense'" in (tmp_path / "a").read_text()
+    while "ready" not in (tmp_path / "b").read_text():
+        assert alive(pids[1])
+        time.sleep(0.01)
+    title = Path(f"/proc/{pids[1]}/cmdline").read_bytes().rstrip(b"\0").decode()
+    assert title == "robot_formation drive --ros-args -r __ns:=/leader"
+    assert os.getsid(pids[1]) == pids[1]  # a terminal's Ctrl-C is for the launcher
+    os.kill(pids[1], signal.SIGINT)
+    assert ended(pids[1]) == 0
+    assert (tmp_path / "server.log").read_text() == ""
+
+
+def test_a_killed_node_is_told_by_its_signal(tmp_path: Path, environment: dict[str, str]) -> None:
+    with ForkServer(environment, tmp_path / "server.log") as server:
+        pid = server.start("leader", RIGHT, tmp_path / "leader")
+    os.kill(pid, signal.SIGKILL)
+    assert ended(pid) == -signal.SIGKILL
+
+
+def test_what_cant_be_imported_is_one_line(tmp_path: Path, environment: dict[str, str]) -> None:
+    (tmp_path / "rclpy.py").write_text("raise ImportError('librcl.so is missing')\n")
+    path = os.pathsep.join([str(tmp_path), environment.get("PYTHONPATH", "")])
+    with (
+        ForkServer({**environment, "PYTHONPATH": path}, tmp_path / "server.log") as server,
+        pytest.raises(RunError, match=r"^the nodes can't be started: ImportError: librcl\.so is missing$"),
+    ):
+        server.start("drive", RIGHT, tmp_path / "drive")
+
+
+def test_orphans_are_adopted_only_while_nodes_start(tmp_path: Path, environment: dict[str, str]) -> None:
+    with ForkServer(environment, tmp_path / "server.log"):
+        pass
+    code = "import os, sys; pid = os.fork(); print(pid, flush=True) if pid else os.execlp('sleep', 'sleep', '30')"
+    reading, writing = os.pipe()
+    child = os.posix_spawn(
+        sys.executable, [sys.executable, "-c", code], os.environ, file_actions=[(os.POSIX_SPAWN_DUP2, writing, 1)]
+    )
+    os.waitpid(child, 0)
+    orphan = int(os.read(reading, 20))
+    os.close(reading)
+    os.close(writing)
+    try:
+        status = Path(f"/proc/{orphan}/stat").read_text().rpartition(")")[2].split()
+        assert int(status[1]) != os.getpid()
+    finally:
+        os.kill(orphan, signal.SIGKILL)
