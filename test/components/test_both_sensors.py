@@ -113,10 +113,6 @@ def test_signatures_name_the_same_faces_and_boxes_nearly_agree(
             assert getattr(found[face], side) == pytest.approx(getattr(theirs[face], side), abs=most_px)
 
 
-def test_the_faces_of_the_tags_are_the_signatures_of_the_fine_tuner() -> None:
-    assert (Face.TARGET, Face.FRONT, Face.REAR) == (Face.TARGET, Face.FRONT, Face.REAR)
-
-
 def test_index_stays_and_age_counts_while_a_block_moves(bench: Bench, wire: Wire) -> None:
     reports = [
         blocks(wire.give(IMAGE, image(bench.picture(0.002 * number, seed=number), number))) for number in range(1, 8)

@@ -95,7 +95,7 @@ def test_every_requirement_has_a_rosdep_key_that_brings_it(
         "python3-opencv": {"opencv-python-headless"},
         "python3-pil": {"pillow"},
         "python3-yaml": {"PyYAML"},
-        **{f"python3-{name}": {name} for name in ("joblib", "matplotlib", "numpy", "scipy")},
+        **{f"python3-{name}": {name} for name in ("joblib", "matplotlib", "numpy", "scipy", "setproctitle")},
         **{f"python3-{name}-pip": {name} for name in ("pybullet", "rosbags")},
     }
     keys = {element.text or "" for element in package_xml.iter("exec_depend")}
