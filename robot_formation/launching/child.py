@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import yaml
@@ -24,7 +25,7 @@ class Child:
         pid: the process id.
     """
 
-    def __init__(self, process: Process, folder: Path, server: ForkServer) -> None:
+    def __init__(self, process: Process, folder: Path, server: ForkServer, give_up: Callable[[], bool]) -> None:
         self.process = process
         stem = process.name.strip("/").replace("/", "_")
         self._log = folder / f"{stem}.log"
@@ -32,7 +33,8 @@ class Child:
         content = {"/**": {"ros__parameters": process.ros_parameters()}}
         parameters.write_text(yaml.safe_dump(content), encoding="utf-8")
         arguments = ["--ros-args", "-r", f"__ns:={process.namespace}", "--params-file", str(parameters)]
-        self.pid = server.start(process.executable, arguments, self._log)
+        self._log.touch()
+        self.pid = server.start(process.executable, arguments, self._log, give_up)
         self.exit_code: int | None = None
         self.forced = False
         self.usage: NodeUsage | None = None
@@ -45,10 +47,17 @@ class Child:
     def poll(self) -> int | None:
         """Return the exit code (negative: the signal that killed it), None while it runs."""
         if self.exit_code is None:
-            pid, status, used = os.wait4(self.pid, os.WNOHANG)
+            try:
+                pid, status, used = os.wait4(self.pid, os.WNOHANG)
+            except ChildProcessError:  # the process that forked it was killed before this one could adopt it
+                return None if self.state else self._lost()
             if pid:
                 self.exit_code = os.waitstatus_to_exitcode(status)
                 self.usage = NodeUsage(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0)
+        return self.exit_code
+
+    def _lost(self) -> int:
+        self.exit_code = -signal.SIGKILL
         return self.exit_code
 
     def signal(self, number: signal.Signals) -> None:

@@ -14,34 +14,37 @@ import gc
 import importlib
 import json
 import os
+import select
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
 import setproctitle
 
+from robot_formation import exit_codes
+from robot_formation.errors import FormationError
 from robot_formation.experiment.run_result import RunError
+from robot_formation.launching.outcome import manner
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _PR_GET_CHILD_SUBREAPER = 37
 _ADOPTION_S = 5.0
-# What all nodes need; what only some need is imported before the first of these is forked.
+_END_S = 2.0
+_POLL_S = 0.1
 _COMMON = ("robot_formation.nodes.executables", "robot_formation.nodes.host.component_node")
-_OWN = {
-    "world": "robot_formation.components.world",
-    "overhead_tracker": "robot_formation.components.overhead_tracker",
-    "drive": "robot_formation.components.drive",
-    "block_detector": "robot_formation.components.block_detector",
-    "predictor": "robot_formation.components.predictor",
-    "fine_tuner": "robot_formation.components.fine_tuner",
-    "leader": "robot_formation.components.leader",
-    "recorder": "robot_formation.nodes.recorder.recorder_node",
-}
+"""Modules that all nodes need; what only some need is imported before the first of these is forked."""
+_RECORDER = "robot_formation.nodes.recorder.recorder_node"
+ANSWER_S = 60.0
+"""How long the server may take to import what a node needs and to fork it, s."""
+
+
+class NodeNotStartedError(FormationError):
+    """The process that starts nodes died, hangs, or was not waited for."""
 
 
 class ForkServer:
@@ -77,31 +80,51 @@ class ForkServer:
     def __exit__(self, *error: object) -> None:
         with contextlib.suppress(BrokenPipeError):
             self._requests.close()
-        self._process.wait()
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:  # it was stopped, or hangs in an import
+            self._process.kill()
+            self._process.wait()
         self._answers.close()
         self._stack.close()
 
-    def start(self, executable: str, arguments: Sequence[str], log: Path) -> int:
+    def start(
+        self, executable: str, arguments: Sequence[str], log: Path, give_up: Callable[[], bool] = lambda: False
+    ) -> int:
         """Start a node; return its process id.
 
         Args:
             executable: the name of the executable.
             arguments: its arguments, without the name.
             log: file for its output.
+            give_up: asked while waiting for the server: whether to wait no longer.
 
         Raises:
-            RunError: if the server has ended, which it does when something can't be imported.
+            RunError: if something can't be imported.
+            NodeNotStartedError: if the server died or doesn't answer, or `give_up` said so.
         """
         request = {"executable": executable, "arguments": list(arguments), "log": str(log)}
-        answer = b""
         with contextlib.suppress(BrokenPipeError):
             self._requests.write(json.dumps(request).encode() + b"\n")
             self._requests.flush()
-            answer = self._answers.readline()
-        if not answer:
-            last = self._log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-            raise RunError(f"the nodes can't be started: {last[-1] if last else 'the process that starts them ended'}")
-        return int(answer)
+        answer = self._answer(give_up)
+        if answer:
+            return int(answer)
+        code = self._process.wait()
+        last = self._log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        if code == 1 and last:  # Python's own exit code for an exception
+            raise RunError(f"the nodes can't be started: {last[-1]}")
+        raise NodeNotStartedError(f"{executable} was not started: the process that starts nodes {manner(code)}")
+
+    def _answer(self, give_up: Callable[[], bool]) -> bytes:
+        """Read the answer to a request; empty if the server has ended."""
+        end = time.monotonic() + ANSWER_S
+        while not select.select([self._answers], [], [], _POLL_S)[0]:
+            if give_up():
+                raise NodeNotStartedError("interrupted")
+            if time.monotonic() > end:
+                raise NodeNotStartedError(f"the process that starts nodes did not answer for {ANSWER_S:g} s")
+        return self._answers.readline()
 
 
 @contextlib.contextmanager
@@ -137,26 +160,45 @@ def serve(requests: BinaryIO, answers: BinaryIO, launcher: int) -> int:
         importlib.import_module(name)
     for line in requests:
         request = json.loads(line)
-        if request["executable"] in _OWN:
-            importlib.import_module(_OWN[request["executable"]])
+        _import_own(request["executable"])
         gc.freeze()  # what is imported stays shared: collections in the nodes don't write to it
         middle = os.fork()
         if middle == 0:
-            pid = os.fork()
+            pid = _forked_or_gone()
             if pid:
                 os.write(answers.fileno(), b"%d\n" % pid)
                 os._exit(0)
             requests.close()
             answers.close()
             return _node(request["executable"], request["arguments"], request["log"], launcher)
-        os.waitpid(middle, 0)
-    return 0
+        if os.waitpid(middle, 0)[1]:
+            return exit_codes.NODE_DIED
+    return exit_codes.DONE
+
+
+def _import_own(executable: str) -> None:
+    """Import what only this executable needs."""
+    from robot_formation.components.catalogue import KINDS
+
+    if executable in KINDS:
+        KINDS[executable].classes()
+    else:
+        importlib.import_module(_RECORDER)
+
+
+def _forked_or_gone() -> int:
+    """Fork; end this process at once where that fails, so that nobody takes it for the server."""
+    try:
+        return os.fork()
+    except OSError as error:
+        print(f"no process can be made: {error.strerror}", file=sys.stderr, flush=True)
+        os._exit(exit_codes.NODE_DIED)
 
 
 def _node(executable: str, arguments: list[str], log: str, launcher: int) -> int:
     """Be a node from here on; return its exit code."""
     os.setsid()
-    nothing, output = os.open(os.devnull, os.O_RDONLY), os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+    nothing, output = os.open(os.devnull, os.O_RDONLY), os.open(log, os.O_WRONLY | os.O_APPEND)
     for source, target in ((nothing, 0), (output, 1), (output, 2)):
         os.dup2(source, target)
     for source in (nothing, output):

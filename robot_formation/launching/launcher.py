@@ -19,7 +19,7 @@ from robot_formation.experiment.scenario import Scenario
 from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
-from robot_formation.launching.fork_server import ForkServer
+from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
 from robot_formation.launching.outcome import recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
@@ -84,7 +84,7 @@ class Launcher:
 
         Raises:
             BagError: if the bag's path is taken.
-            RunError: if a node refuses its parameters.
+            RunError: if a node refuses its parameters, or something that it needs can't be imported.
         """
         with contextlib.ExitStack() as stack:
             if self.bag is not None:
@@ -115,7 +115,7 @@ class Launcher:
             for process in table:
                 if self._signals.count:
                     return
-                self._children.append(Child(process, folder, server))
+                self._children.append(Child(process, folder, server, lambda: bool(self._signals.count)))
 
     def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""
@@ -134,7 +134,11 @@ class Launcher:
         )
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:
-            self._start(table, folder, environment)
+            try:
+                self._start(table, folder, environment)
+            except NodeNotStartedError as error:
+                interrupted = bool(self._signals.count)
+                return (exit_codes.INTERRUPTED, "interrupted") if interrupted else (exit_codes.NODE_DIED, str(error))
             watchdog = Watchdog([child.name for child in self._children], idle_s=self._patience_s())
             while True:
                 monitor.spin(_POLL_S)

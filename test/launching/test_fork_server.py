@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from graph_tools import alive
+from graph_tools import alive, launch, short_scenario
 from robot_formation.experiment.run_result import RunError
 from robot_formation.launching.environment import node_environment
-from robot_formation.launching.fork_server import ForkServer
+from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
 from robot_formation.network.ros_domain import DomainReservation
 
 pytestmark = pytest.mark.graph
@@ -27,6 +27,11 @@ def environment(tmp_path: Path) -> Iterator[dict[str, str]]:
         yield node_environment(domain, tmp_path)
 
 
+def touched(log: Path) -> Path:
+    log.touch()
+    return log
+
+
 def ended(pid: int) -> int:
     """The exit code of a child, negative for a signal; only a process's own children can be waited for."""
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
@@ -36,7 +41,7 @@ def test_a_node_ends_with_its_own_code_and_its_words_are_in_its_own_log(
     tmp_path: Path, environment: dict[str, str]
 ) -> None:
     with ForkServer(environment, tmp_path / "server.log") as server:
-        pids = [server.start("drive", arguments, tmp_path / name) for name, arguments in (("a", WRONG), ("b", RIGHT))]
+        pids = [server.start("drive", words, touched(tmp_path / name)) for name, words in (("a", WRONG), ("b", RIGHT))]
     assert ended(pids[0]) == 2
     assert "no parameter 'nonsense'" in (tmp_path / "a").read_text()
     while "ready" not in (tmp_path / "b").read_text():
@@ -52,7 +57,7 @@ def test_a_node_ends_with_its_own_code_and_its_words_are_in_its_own_log(
 
 def test_a_killed_node_is_told_by_its_signal(tmp_path: Path, environment: dict[str, str]) -> None:
     with ForkServer(environment, tmp_path / "server.log") as server:
-        pid = server.start("leader", RIGHT, tmp_path / "leader")
+        pid = server.start("leader", RIGHT, touched(tmp_path / "leader"))
     os.kill(pid, signal.SIGKILL)
     assert ended(pid) == -signal.SIGKILL
 
@@ -65,6 +70,38 @@ def test_what_cant_be_imported_is_one_line(tmp_path: Path, environment: dict[str
         pytest.raises(RunError, match=r"^the nodes can't be started: ImportError: librcl\.so is missing$"),
     ):
         server.start("drive", RIGHT, tmp_path / "drive")
+
+
+def test_a_killed_server_is_named_and_a_stopped_one_is_not_waited_for_after_an_interrupt(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    (tmp_path / "node").touch()
+    with ForkServer(environment, tmp_path / "server.log") as server:
+        server._process.kill()
+        with pytest.raises(NodeNotStartedError, match=r"^drive was not started: .* was killed by SIGKILL$"):
+            server.start("drive", RIGHT, tmp_path / "node")
+    with ForkServer(environment, tmp_path / "server.log") as server:
+        server._process.send_signal(signal.SIGSTOP)
+        with pytest.raises(NodeNotStartedError, match="interrupted"):
+            server.start("drive", RIGHT, tmp_path / "node", give_up=lambda: True)
+    assert server._process.returncode == -signal.SIGKILL
+
+
+def test_a_run_whose_nodes_cannot_be_forked_ends_as_one_whose_node_died(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entered = ForkServer.__enter__
+
+    def killed(server: ForkServer) -> ForkServer:
+        entered(server)
+        server._process.kill()
+        return server
+
+    monkeypatch.setattr(ForkServer, "__enter__", killed)
+    result = launch(short_scenario(), tmp_path / "bag")
+    assert result.exit_code == 4
+    assert "the process that starts nodes was killed by SIGKILL" in result.reason
+    assert (result.bag, list(tmp_path.iterdir())) == (None, [])
 
 
 def test_orphans_are_adopted_only_while_nodes_start(tmp_path: Path, environment: dict[str, str]) -> None:

@@ -36,14 +36,30 @@ def name_of(file: Path) -> str:
 
 
 def exists(module: str) -> bool:
+    if not re.fullmatch(r"robot_formation(\.\w+)+", module):
+        return False
     path = PACKAGE.parent.joinpath(*module.split("."))
     return path.with_suffix(".py").is_file() or (path / "__init__.py").is_file()
 
 
-def imports(file: Path) -> Iterator[str]:
-    """Every module that a file imports, wherever in it, as an absolute name."""
+def without_types(tree: ast.AST) -> ast.AST:
+    """A module without what it imports for its annotations only."""
+
+    class Remover(ast.NodeTransformer):
+        def visit_If(self, node: ast.If) -> ast.AST | None:
+            return None if ast.unparse(node.test) == "TYPE_CHECKING" else self.generic_visit(node)
+
+    Remover().visit(tree)
+    return tree
+
+
+def imports(file: Path, *, for_types: bool = True) -> Iterator[str]:
+    """Every module that a file imports, wherever in it, as an absolute name; modules named in a text too."""
     package = file.parent.relative_to(PACKAGE.parent).parts
-    for node in ast.walk(ast.parse(file.read_text())):
+    tree: ast.AST = ast.parse(file.read_text())
+    for node in ast.walk(tree if for_types else without_types(tree)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and exists(node.value):
+            yield node.value
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -54,21 +70,14 @@ def imports(file: Path) -> Iterator[str]:
                 yield inner if module.startswith("robot_formation") and exists(inner) else module
 
 
-def imports_for_types(file: Path) -> Iterator[str]:
-    """The modules that a file imports for its annotations only."""
-    tree = ast.parse(file.read_text())
-    blocks = [node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
-    for node in (inner for block in blocks for inner in block.body if isinstance(inner, ast.ImportFrom)):
-        for alias in node.names:
-            name = f"{node.module}.{alias.name}"
-            yield name if exists(name) else str(node.module)
-
-
 GRAPH = {name_of(file): set(imports(file)) for file in FILES}
 OWN = {module: {name for name in found if name.split(".")[0] == "robot_formation"} for module, found in GRAPH.items()}
 
 
-RUNTIME = {name_of(file): OWN[name_of(file)] - set(imports_for_types(file)) for file in FILES}
+RUNTIME = {
+    name_of(file): {name for name in imports(file, for_types=False) if name.split(".")[0] == "robot_formation"}
+    for file in FILES
+}
 
 
 def reachable(module: str) -> set[str]:
@@ -93,7 +102,7 @@ def test_imports_run_downward_only() -> None:
 
 
 def test_no_modules_import_each_other_in_a_circle_lazily_or_not() -> None:
-    graph = {module: {name for name in names if name in OWN} for module, names in RUNTIME.items()}
+    graph = {module: {name for name in names if name in OWN and name != module} for module, names in RUNTIME.items()}
     try:
         list(TopologicalSorter(graph).static_order())
     except CycleError as error:
