@@ -35,7 +35,7 @@ from robot_formation.surface import SURFACES
 from robot_formation.vision.marker import MarkerKind
 from robot_formation.world.parameters import CameraMode
 
-# What a scenario's setup fixes, so that the defaults need not (and must not) say it.
+# What a scenario's setup fixes, so that config/ need not (and must not) say it.
 FIXED = {
     "world": {"seed", "robots", "start_x_m", "start_y_m", "start_heading_rad"},
     "leader": {"followers"},
