@@ -22,7 +22,7 @@ from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.experiment.scenario_json_schema import scenario_schema
 from robot_formation.nodes.host.ros_parameters import AT_START, HostParameters, reasons
 from robot_formation.nodes.player.player_node import PlayerNode, PlayerParameters
-from robot_formation.nodes.progress.progress_node import Executable, ProgressParameters
+from robot_formation.nodes.progress.progress_node import ProgressExecutable, ProgressParameters
 from robot_formation.nodes.recorder.recorder_node import RecorderNode, RecorderParameters
 from robot_formation.parameters import Spec, specs
 
@@ -53,7 +53,7 @@ def fixed_parameters(name: str) -> Mapping[str, str]:
     """List why parameters of a page can't be set while the node runs, by shell pattern."""
     if name in KINDS:
         return KINDS[name].component_class().fixed
-    others = {"recorder": RecorderNode.fixed, "player": PlayerNode.fixed, "progress": Executable.fixed}
+    others = {"recorder": RecorderNode.fixed, "player": PlayerNode.fixed, "progress": ProgressExecutable.fixed}
     return {**others, COMMON: {"*": AT_START}}[name]
 
 

@@ -21,11 +21,12 @@ from robot_formation.errors import FormationError, shown
 
 T = TypeVar("T")
 
-_ELEMENTS: dict[object, type] = {
+LIST_ELEMENTS: dict[object, type] = {
     tuple[float, ...]: float,
     tuple[int, ...]: int,
     tuple[str, ...]: str,
 }
+"""Types of parameters that are lists, and of what."""
 
 _LONGEST_NAME = 100
 _LISTED = 240  # characters
@@ -244,10 +245,10 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     Raises:
         ParameterError: on a wrong type, or a value outside the range or the choices.
     """
-    if spec.type in _ELEMENTS:
+    if spec.type in LIST_ELEMENTS:
         if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
             raise ParameterError(f"{subject} must be a list, not {shown(value)}")
-        items = tuple(_check_one(spec, _ELEMENTS[spec.type], item, subject) for item in value)
+        items = tuple(_check_one(spec, LIST_ELEMENTS[spec.type], item, subject) for item in value)
         if spec.default and not items:
             raise ParameterError(f"{subject} must not be empty")
         return items

@@ -15,7 +15,7 @@ from robot_formation.bag.errors import BagError
 from robot_formation.system.files import size_text
 
 MAGIC = b"\x89MCAP0\r\n"
-MOST_RECORD_BYTES = 256 << 20
+MOST_MCAP_RECORD_BYTES = 256 << 20
 """Size of the largest record that is read."""
 
 _HEAD = struct.Struct("<BQ")  # kind, length
@@ -61,8 +61,8 @@ def records(stream: BinaryIO, at: int) -> Iterator[object]:
             raise BagError("a record goes beyond the file's end")
         if kind >= _OTHERS:
             continue
-        if length > MOST_RECORD_BYTES:
-            raise BagError(f"a record has {size_text(length)}, more than {size_text(MOST_RECORD_BYTES)}")
+        if length > MOST_MCAP_RECORD_BYTES:
+            raise BagError(f"a record has {size_text(length)}, more than {size_text(MOST_MCAP_RECORD_BYTES)}")
         content = ReadDataStream(io.BytesIO(stream.read(length)))
         yield kinds.Message.read(content, length) if kind == _MESSAGE else _KINDS[kind].read(content)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from robot_formation.batch.resumable_table import ResumableTable, read_record, write_record
@@ -20,7 +20,10 @@ Key = tuple[float, float]
 
 @dataclass(frozen=True)
 class TableRow:
-    """One reported block of a sample, or a sample in which nothing was reported; see `CameraSample` and `Block`."""
+    """One reported block of a sample, or a sample in which nothing was reported; see `CameraSample` and `Block`.
+
+    The block's columns are empty where nothing was reported.
+    """
 
     u_m: float
     v_m: float
@@ -42,8 +45,6 @@ class TableRow:
             raise ValueError("half a block")
 
 
-COLUMNS = tuple(field.name for field in fields(TableRow))
-"""The block's columns are empty where nothing was reported."""
 _POSE_COLUMNS = 5
 
 

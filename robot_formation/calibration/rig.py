@@ -15,7 +15,7 @@ import numpy as np
 from robot_formation.drive.curves import CalibrationError
 from robot_formation.drive.movement_system import LEG_SIGNS, Drive
 from robot_formation.geometry.se2 import Motion
-from robot_formation.names import JOINTS
+from robot_formation.names import JOINTS, WHEELS
 from robot_formation.surface import Surface
 from robot_formation.world.events import JointStates
 from robot_formation.world.imperfections import generator
@@ -25,7 +25,6 @@ from robot_formation.world.world import World
 
 LEGS = {"v": "x", "u": "y", "turn": "yaw"}
 """Legs of the drive by calibrated axis."""
-_WHEELS = 4
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ class RobotOnRig:
         """
         angles = tuple(rotation_rad * sign for sign in LEG_SIGNS[LEGS[axis]])
         before = self._joints
-        self._run(angles, (speed_rad_s,) * _WHEELS)
+        self._run(angles, (speed_rad_s,) * len(WHEELS))
         return self._observe(before)
 
     def move(self, drive: Drive, target: Motion) -> tuple[Observation, Motion]:
@@ -119,7 +118,7 @@ class RobotOnRig:
     def _observe(self, before: Sequence[float]) -> Observation:
         dot, heading = self._look()
         turn = math.remainder(heading - self._heading, math.tau)
-        wheels = tuple(b - a for a, b in zip(before[:_WHEELS], self._joints[:_WHEELS], strict=True))
+        wheels = tuple(b - a for a, b in zip(before[: len(WHEELS)], self._joints[: len(WHEELS)], strict=True))
         observation = Observation(math.dist(self._dot, dot), turn, wheels)
         self._dot, self._heading = dot, heading
         return observation

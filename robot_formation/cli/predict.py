@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[PredictorParameters]:
-    """Return each predictor's parameters: config/, then the settings.
+    """Return each predictor's parameters: the defaults, then the settings.
 
     Raises:
         FormationError: naming what is misspelt, out of range or of another node.

@@ -19,14 +19,14 @@ class ScenarioError(FormationError):
 def node_defaults(kind: str, marker: MarkerKind = MarkerKind.COLOURS) -> dict[str, object]:
     """Read what config/NODE.yaml has other than the class of the node's parameters, flat.
 
-    With a marker of tags, what config/tags/NODE.yaml has goes before it.
+    What config/MARKER/NODE.yaml has, the folder being called like the marker's kind, goes before it.
 
     Raises:
         ScenarioError: if a file has not the form of a ROS parameter file.
     """
     values = parameter_file(config_dir() / f"{kind}.yaml")
-    overlay = config_dir() / "tags" / f"{kind}.yaml"
-    if marker is MarkerKind.TAGS and overlay.exists():
+    overlay = config_dir() / marker.value / f"{kind}.yaml"
+    if overlay.exists():
         values.update(parameter_file(overlay))
     return values
 

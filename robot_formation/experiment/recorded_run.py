@@ -45,7 +45,7 @@ class Recording:
         self._parameters = node_parameters(details)
         self.notes = _changes({**mapping(details, "versions"), "commit": details.get("git_commit", "")})
         if not self._parameters:
-            self.notes.append("the bag doesn't tell the nodes' parameters: those of config/ are taken")
+            self.notes.append("the bag doesn't tell the nodes' parameters: the defaults are taken")
 
     def has(self, robot: str, topic: names.Topic) -> bool:
         """Return whether there are messages on a robot's topic."""

@@ -40,7 +40,7 @@ from robot_formation.vision.marker import MarkerKind
 
 P = TypeVar("P")
 Settings = Mapping[str, Mapping[str, object]]
-"""Parameters that differ from config/: by node, then by dotted name."""
+"""Parameters that differ from the defaults: by node, then by dotted name."""
 
 
 FOLLOWS_FROM_SETUP = {
@@ -137,7 +137,7 @@ class Scenario:
 
 
 def build(setup: Setup, settings: Settings) -> Scenario:
-    """Make every node's parameters: config/, then the scenario's settings, then what follows from the setup.
+    """Make every node's parameters: the defaults, then the scenario's settings, then what follows from the setup.
 
     Raises:
         ParameterError: on an unknown name, a wrong type or a value out of range.

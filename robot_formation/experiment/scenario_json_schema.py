@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import FOLLOWS_FROM_SETUP, Setup
-from robot_formation.parameters import Spec, specs
+from robot_formation.parameters import LIST_ELEMENTS, Spec, specs
 
 _TYPES: dict[object, dict[str, object]] = {
     bool: {"type": "boolean"},
@@ -12,7 +12,6 @@ _TYPES: dict[object, dict[str, object]] = {
     float: {"type": "number"},
     str: {"type": "string"},
 }
-_ELEMENTS: dict[object, type] = {tuple[float, ...]: float, tuple[int, ...]: int, tuple[str, ...]: str}
 
 
 def scenario_schema() -> dict[str, object]:
@@ -52,8 +51,8 @@ def _group(found: list[Spec], prefix: str) -> dict[str, object]:
 def _property(spec: Spec) -> dict[str, object]:
     unit = f" [{spec.unit}]" if spec.unit else ""
     said = {"description": spec.description + unit, "default": spec.plain_default()}
-    if spec.type in _ELEMENTS:
-        return {**said, "type": "array", "items": {**_TYPES[_ELEMENTS[spec.type]], **_limits(spec)}}
+    if spec.type in LIST_ELEMENTS:
+        return {**said, "type": "array", "items": {**_TYPES[LIST_ELEMENTS[spec.type]], **_limits(spec)}}
     return {**said, **_TYPES[spec.type], **_limits(spec)}
 
 

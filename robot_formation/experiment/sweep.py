@@ -187,7 +187,9 @@ class Table:
             raise SweepError(f"{folder} is not empty and holds no sweep; choose another --out")
         folder.mkdir(parents=True, exist_ok=True)
         write_record(record, asdict(plan))
-        self._table = _table(folder / RUNS_NAME)
+        self._table = ResumableTable(
+            folder / RUNS_NAME, Row, SweepError, "no table of a sweep's runs; choose another --out"
+        )
         self.rows: dict[Task, Row] = {}
         if self._table.path.exists():
             self.rows = {row.task: row for row in self._table.read()}
@@ -216,19 +218,6 @@ def _difference(earlier: Sequence[str], now: Sequence[str]) -> str:
     said = [f"it was made with --set {' --set '.join(gone)}"] if gone else []
     said += [f"{'and' if gone else 'it was made'} without --set {' --set '.join(new)}"] if new else []
     return " ".join(said) or f"it was made with them in another order, --set {' --set '.join(earlier)}"
-
-
-def read_rows(path: Path) -> Iterator[Row]:
-    """Read the rows of a sweep's table; a half-written last one is left out.
-
-    Raises:
-        SweepError: if the file is no such table.
-    """
-    return _table(path).read()
-
-
-def _table(path: Path) -> ResumableTable[Row]:
-    return ResumableTable(path, Row, SweepError, "no table of a sweep's runs; choose another --out")
 
 
 def remaining(plan: Plan, rows: Mapping[Task, Row]) -> list[Task]:

@@ -78,10 +78,10 @@ class FineTunerParameters:
 
     def __post_init__(self) -> None:
         """Check that the mode can keep the formation distance."""
-        if self.mode == "paper":
+        if self.mode is AlignmentModeName.PAPER:
             self.alignment.at_distance(self.formation_distance_m)
         least_m = self.precise.approach.body_width_m + self.precise.approach.clearance_m
-        if self.mode == "precise" and self.formation_distance_m < least_m:
+        if self.mode is AlignmentModeName.PRECISE and self.formation_distance_m < least_m:
             raise ParameterError(
                 f"fine_tuner: 'formation_distance_m' of {self.formation_distance_m} leaves less than "
                 f"'precise.approach.clearance_m' between the bodies; it must be at least {least_m:.3f}"

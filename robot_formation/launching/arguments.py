@@ -12,7 +12,9 @@ from robot_formation.experiment.scenario import Scenario
 from robot_formation.network.loopback import PROFILES, RANGE, use_loopback
 from robot_formation.paths import config_dir
 from robot_formation.system.yaml_files import Yaml, read_yaml
+from robot_formation.world.parameters import CameraMode
 
+_CAMERA_MODES = tuple(mode.value for mode in CameraMode)
 _SWITCH = ("true", "false", "True", "False", "1", "0")
 _OPENING, _CLOSING = "[{", "]}"
 _BEFORE_QUOTE = "=[{,: "
@@ -33,7 +35,7 @@ ARGUMENTS = {
     "surface": Argument("", "surface: see 'formation list surfaces'; empty: the scenario's"),
     "predictor": Argument("", "predictor: see 'formation list predictors'; empty: the scenario's"),
     "seed": Argument("", "seed of every random stream; empty: the scenario's"),
-    "camera": Argument("", "stream or on_demand; empty: the scenario's", ("", "stream", "on_demand")),
+    "camera": Argument("", f"{' or '.join(_CAMERA_MODES)}; empty: the scenario's", ("", *_CAMERA_MODES)),
     "real_time_factor": Argument("", "0: as fast as possible, 1: real time; empty: the scenario's"),
     "set": Argument("", "further settings, separated by spaces, like 'predictor.forgetting=0.95 followers=2'"),
     "namespace": Argument("", "namespace of the formation, below the one that was pushed; empty: none of its own"),

@@ -30,24 +30,24 @@ def recorder() -> int:
     """Run the recorder until it ends."""
     stop_on_signals()
     from robot_formation.nodes.host.component_node import run_node
-    from robot_formation.nodes.recorder.recorder_node import Executable
+    from robot_formation.nodes.recorder.recorder_node import RecorderExecutable
 
-    return run_node("recorder", Executable)
+    return run_node("recorder", RecorderExecutable)
 
 
 def player() -> int:
     """Run the player until it ends."""
     stop_on_signals()
     from robot_formation.nodes.host.component_node import run_node
-    from robot_formation.nodes.player.player_node import Executable
+    from robot_formation.nodes.player.player_node import PlayerExecutable
 
-    return run_node("player", Executable)
+    return run_node("player", PlayerExecutable)
 
 
 def progress() -> int:
     """Run the progress node until it ends."""
     stop_on_signals()
     from robot_formation.nodes.host.component_node import run_node
-    from robot_formation.nodes.progress.progress_node import Executable
+    from robot_formation.nodes.progress.progress_node import ProgressExecutable
 
-    return run_node("progress", Executable)
+    return run_node("progress", ProgressExecutable)

@@ -21,10 +21,10 @@ _MOST_VALUES = 100_000  # with every alias written out
 _MOST_BITS = 1024  # of a whole number: more than a float can hold
 _MERGE = "tag:yaml.org,2002:merge"
 
-# libyaml's parser where PyYAML was built with it: ten times as fast.
 Yaml: TypeAlias = Any
 """A value of a YAML file."""
 
+# libyaml's parser where PyYAML was built with it: ten times as fast.
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 

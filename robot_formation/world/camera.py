@@ -14,7 +14,8 @@ from robot_formation.world.parameters import CameraParameters, WorldParameters
 from robot_formation.world.pose import Pose
 from robot_formation.world.scene import FULL, Scene
 
-Picture = NDArray[np.uint8]
+RenderedPicture = NDArray[np.uint8]
+"""What a robot's camera gives: RGB (rows, columns, 3) of the size that the camera's parameters say."""
 Light = NDArray[np.uint16]
 """Linear light (rows, columns, 3): reflectance under the room's light, 65535 is full."""
 

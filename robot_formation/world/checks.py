@@ -6,13 +6,12 @@ import math
 from collections.abc import Sequence
 
 from robot_formation.errors import FormationError
+from robot_formation.names import WHEELS
 from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
 from robot_formation.world.parameters import MotorParameters, WorldParameters
 from robot_formation.world.pose import off_plate
 from robot_formation.world.start import RobotStart
-
-WHEELS = 4
 
 Command = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -54,7 +53,7 @@ def check_command(robot: str, angles: Sequence[float], speeds: Sequence[float], 
         WorldError: on a wrong number of values, one that is not finite, or one beyond the motor's limits.
     """
     checked = tuple(float(value) for value in angles), tuple(float(value) for value in speeds)
-    if any(len(values) != WHEELS for values in checked):
+    if any(len(values) != len(WHEELS) for values in checked):
         raise WorldError(
             f"robot '{robot}': a command needs four wheel angles and four speed limits, "
             f"not {len(checked[0])} and {len(checked[1])}"

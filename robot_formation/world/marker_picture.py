@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from robot_formation.surface import Plane
-from robot_formation.world.camera import Camera, Picture
+from robot_formation.world.camera import Camera, RenderedPicture
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import pose_on_surface
 from robot_formation.world.sensor import Sensor
@@ -16,7 +16,7 @@ FACE_TURNS = {"target": 0.0, "front": -0.5 * math.pi, "rear": 0.5 * math.pi}
 
 def marker_picture(
     parameters: WorldParameters, face: str = "target", *, seed: int = 0, distance_m: float = 0.32
-) -> Picture:
+) -> RenderedPicture:
     """First picture that a camera takes of a face of the marker on level ground, uint8 (rows, columns, 3) RGB.
 
     The robots' origins are `distance_m` apart with the seen robot on the left, so that at the formation's 0.32 m the

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.world.camera import Light, Picture
+from robot_formation.world.camera import Light, RenderedPicture
 from robot_formation.world.exposure import (
     READOUT_S,
     SIGNAL_PER_LUX_S,
@@ -50,7 +50,7 @@ class Development:
     noise: NDArray[np.float32]
 
     @property
-    def picture(self) -> Picture:
+    def picture(self) -> RenderedPicture:
         """Picture without noise and flicker, uint8 (rows, columns, 3) RGB."""
         return np.asarray(cv2.convertScaleAbs(self.levels), np.uint8)
 
@@ -90,7 +90,7 @@ class Sensor:
         noise = _noise_table(p, exposure.gain, np.array(balance))
         return Development(levels, _sigma(levels, noise), exposure, balance, self._ripple(exposure), noise)
 
-    def expose(self, development: Development, time_s: float) -> Picture:
+    def expose(self, development: Development, time_s: float) -> RenderedPicture:
         """One frame with noise and flicker, uint8 (rows, columns, 3) RGB.
 
         Args:

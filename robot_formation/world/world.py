@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
-from robot_formation.world.camera import Camera, Picture
+from robot_formation.world.camera import Camera, RenderedPicture
 from robot_formation.world.checks import Command, WorldError, check_command, check_setup
 from robot_formation.world.events import BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import CameraMode, WorldParameters
@@ -227,7 +227,7 @@ class World:
                 self._frames_owed[name] = max(0, owed - 1)
         return frames
 
-    def _take_picture(self, name: str) -> Picture:
+    def _take_picture(self, name: str) -> RenderedPicture:
         poses = {other: robot.body.pose() for other, robot in self._robots.items()}
         key = tuple(poses.values())
         sensor = self._sensors[name]

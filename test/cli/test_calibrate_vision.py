@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from robot_formation.bag.reader import read_bag
 from robot_formation.calibration import camera_run, camera_table
 from robot_formation.calibration.camera_grid import ANGLES_DEG, Position, measure, positions, true_faces
 from robot_formation.calibration.camera_samples import CameraSample
-from robot_formation.calibration.camera_table import COLUMNS, VisionTable, read_table
+from robot_formation.calibration.camera_table import TableRow, VisionTable, read_table
 from robot_formation.cli.calibrate_vision import conditions_of
 from robot_formation.cli.main import main
 from robot_formation.drive.curves import CalibrationError
@@ -126,7 +127,7 @@ def test_the_files_agree_with_each_other_and_with_the_nodes_defaults(
         if name in said["alignment"] and name != "side_bias_px":  # the default takes it with another side_px_m
             assert abs(said["alignment"][name] - getattr(defaults, name)) < 4.0 * error, name
     rows = list(csv.DictReader((measured / "vision.csv").read_text().splitlines()))
-    assert tuple(rows[0]) == COLUMNS
+    assert list(rows[0]) == [field.name for field in fields(TableRow)]
     table = list(read_table(measured / "vision.csv"))
     assert said["looks"] == {
         "poses": len(table),

@@ -13,6 +13,7 @@ import pytest
 from _pytest.capture import CaptureResult
 
 from robot_formation import paths
+from robot_formation.batch.resumable_table import ResumableTable
 from robot_formation.cli.main import main
 from robot_formation.cli.sweep import default_folder, seeds_text
 from robot_formation.experiment import sweep
@@ -26,6 +27,11 @@ ANNOUNCED = """\
 seeds 1000 to 1002 (3 seeds)
 warning: intervals say nothing with fewer than 5 seeds; 20 are --seeds 0:20
 """
+
+
+def rows_of(folder: Path) -> list[Row]:
+    """The rows of a sweep's table."""
+    return list(ResumableTable(folder / sweep.RUNS_NAME, Row, sweep.SweepError, "no table of a sweep's runs").read())
 
 
 @pytest.fixture
@@ -144,7 +150,7 @@ def test_a_real_sweep_from_the_command_to_the_numbers(capsys: pytest.CaptureFixt
     choice = (*CHOICE[:-1], "1000", *SHORT, "--jobs", 1, "--out", tmp_path / "out", "--json")
     code, said = call(capsys, *choice)
     assert code == 0
-    rows = list(sweep.read_rows(tmp_path / "out" / "runs.csv"))
+    rows = rows_of(tmp_path / "out")
     assert [row.predictor for row in rows] == ["previous", "formation"]
     for entry, row in zip(json.loads(said.out)["summary"], rows, strict=True):
         assert entry["formation_error_rmse_m"]["median"] == row.formation_error_rmse_m
@@ -171,7 +177,7 @@ def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(
     assert said.err.splitlines()[-1] == (
         f"formation sweep: interrupted; the same command with --out {tmp_path / 'out'} goes on"
     )
-    assert sum(1 for _ in sweep.read_rows(tmp_path / "out" / "runs.csv")) == 4
+    assert len(rows_of(tmp_path / "out")) == 4
     assert not (tmp_path / "out" / "summary.json").exists()
 
     monkeypatch.setattr(sweep, "carry_out", whole)
@@ -199,7 +205,7 @@ def test_a_run_that_fails_ends_the_sweep_with_one_line_and_keeps_the_others(
     code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
     assert (code, said.out) == (2, "")
     assert said.err.splitlines()[-1] == "formation sweep: track two, seed 1001: the run stands still"
-    assert sum(1 for _ in sweep.read_rows(tmp_path / "out" / "runs.csv")) == 3
+    assert len(rows_of(tmp_path / "out")) == 3
 
 
 @pytest.mark.parametrize(

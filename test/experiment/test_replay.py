@@ -191,11 +191,11 @@ def test_other_versions_and_parameters_that_are_gone_are_noted(run: Path, tmp_pa
         assert words in text
 
 
-def test_a_bag_without_parameters_is_replayed_with_those_of_config(formation_run: Path, tmp_path: Path) -> None:
+def test_a_bag_without_parameters_is_replayed_with_the_defaults(formation_run: Path, tmp_path: Path) -> None:
     with read_bag(copied(formation_run, tmp_path / "bag", details={})) as opened:
         bare = Recording(opened)
         assert replay_fine_tuner(bare, {})[0].identical
-    assert "those of config/ are taken" in bare.notes[0]
+    assert "the defaults are taken" in bare.notes[0]
 
 
 def test_a_bag_of_something_else_is_refused(tmp_path: Path) -> None:

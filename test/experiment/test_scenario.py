@@ -4,6 +4,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 
 import jsonschema
@@ -31,6 +32,7 @@ from robot_formation.koopman.predictors import NAMES, PredictorParameters
 from robot_formation.parameters import from_mapping, specs, to_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import SURFACES
+from robot_formation.vision.marker import MarkerKind
 from robot_formation.world.parameters import CameraMode
 
 # What a scenario's setup fixes, so that config/ need not (and must not) say it.
@@ -376,3 +378,19 @@ def test_the_value_of_an_option_may_be_a_text() -> None:
 def test_a_wrong_setting_names_where_it_was_written(setting: str) -> None:
     with pytest.raises(FormationError, match=r"^set:="):
         override(load_track("one"), [setting], source="set:=")
+
+
+def test_a_scenario_has_a_field_for_every_node_in_the_catalogues_order() -> None:
+    given = [field.name for field in fields(Scenario) if field.name not in ("setup", "settings")]
+    assert given == list(KINDS)
+
+
+def test_every_kind_of_marker_may_have_defaults_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    head = "/**:\n  ros__parameters:\n"
+    (tmp_path / "drive.yaml").write_text(f"{head}    max_v_m: 0.1\n    max_u_m: 0.1\n")
+    for marker in MarkerKind:
+        (tmp_path / marker.value).mkdir()
+        (tmp_path / marker.value / "drive.yaml").write_text(f"{head}    max_v_m: {len(marker.value)}\n")
+    monkeypatch.setattr(module, "config_dir", lambda: tmp_path)
+    for marker in MarkerKind:
+        assert node_defaults("drive", marker) == {"max_v_m": len(marker.value), "max_u_m": 0.1}

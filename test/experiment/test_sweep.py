@@ -135,7 +135,7 @@ number = st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False))
 def test_a_row_survives_the_table_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, row: Row) -> None:
     folder = tmp_path_factory.mktemp("sweep")
     Table(folder, PLAN).add(row)
-    (found,) = sweep.read_rows(folder / "runs.csv")
+    (found,) = Table(folder, PLAN).rows.values()
     assert repr(found) == repr(row)
 
 

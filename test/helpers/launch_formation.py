@@ -1,6 +1,7 @@
 """A launch test of launch/formation.launch.py: the nodes start, and Ctrl-C ends them in good order.
 
-launching/test_launch_file.py runs it where launch_testing is installed; by hand: launch_test test/launch_formation.py
+test/launching/test_launch_file.py runs it where launch_testing is installed. By hand:
+`launch_test test/helpers/launch_formation.py`.
 """
 
 import os

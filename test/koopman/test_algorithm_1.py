@@ -1,4 +1,4 @@
-"""Algorithm 1 of the paper as it is printed never learns: its innovation is zero, see docs/koopman.md."""
+"""Algorithm 1 of the paper as it is printed never learns: its innovation is zero, see docs/explanation/koopman.md."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -72,6 +72,16 @@ def test_files_that_a_page_names_exist(page: Path) -> None:
     assert missing == set()
 
 
+def test_pages_that_the_code_names_exist() -> None:
+    named = {
+        (file, page)
+        for file in FILES
+        for page in re.findall(r"(?<![\w./])docs/[\w/.-]*\w", text_of(ROOT / file))
+        if not (ROOT / page).exists()
+    }
+    assert named == set()
+
+
 def test_the_index_lists_every_page_once() -> None:
     text = text_of(ROOT / "docs" / "README.md")
     linked = [(ROOT / "docs" / link).resolve() for link in re.findall(r"\]\(([^)#]+\.md)\)", text)]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from repository import ROOT
+from repository import PACKAGE, ROOT
 
 REPLACED = {
     "surprise": "NIS",
@@ -74,3 +74,13 @@ def test_identifiers_and_inflections_are_found(text: str) -> None:
 @pytest.mark.parametrize("text", ["clean", "boolean", "learn", "clean_up"])
 def test_longer_words_are_not(text: str) -> None:
     assert not WORD.search(words(text))
+
+
+def test_no_two_public_classes_of_the_package_have_one_name() -> None:
+    places: dict[str, list[str]] = {}
+    for file in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places.setdefault(node.name, []).append(file.relative_to(PACKAGE).as_posix())
+    assert len(places) > 200
+    assert {name: files for name, files in places.items() if len(files) > 1} == {}

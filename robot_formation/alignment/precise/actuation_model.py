@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robot_formation.alignment.precise.pose_filter import FilterParameters
 from robot_formation.geometry.se2 import Motion, into_frame
 from robot_formation.parameters import parameter
 
-# All chosen; docs/alignment.md ("Constants") says how far runs depend on them.
+# All chosen; docs/explanation/alignment.md ("Constants") says how far runs depend on them.
 _LEAST_DRIVE_M = 0.02
 """A shorter drive ahead teaches nothing of slip and overshoot."""
 _LONGEST_BESIDE_M = 0.02
@@ -19,8 +20,8 @@ _FORGETTING = 0.85
 """Weight of a drive after one more, in the least squares for slip: some seven drives count."""
 _SLIP_SIGMA, _BESIDE_SIGMA_M = 0.05, 0.002
 """Standard deviations before any drive: of the slip, share of the way; of a leg aside's error in length."""
-_NOISE_M = 0.0007
-"""Standard deviation of a drive's measured way aside; as the default of `filter.move_floor_m`."""
+_LEAST_NOISE_M = 1e-6
+"""A measured way aside is never taken for more exact: least squares of exact data end in 0 / 0."""
 _OVERSHOOT_GAIN = 0.4
 """Share of a drive's overshoot in the running mean."""
 _MOST_OVERSHOOT = 0.5
@@ -57,8 +58,15 @@ class ActuationModel:
         drives: how many drives ahead it knows.
     """
 
-    def __init__(self, parameters: ActuationParameters) -> None:
+    def __init__(self, parameters: ActuationParameters, noise_m: float = FilterParameters.move_floor_m) -> None:
+        """Know of no drive yet.
+
+        Args:
+            parameters: of the drive.
+            noise_m: standard deviation of a drive's measured way aside.
+        """
         self._p = parameters
+        self._noise_m = max(noise_m, _LEAST_NOISE_M)
         self.overshoot = 0.0
         self.drives = 0
         self._aside = np.zeros(2)  # slip, and how far legs aside go beside what was asked for [m]
@@ -99,7 +107,7 @@ class ActuationModel:
         regressor = np.array([got[0], 1.0 if driven else 0.0])
         beside = got[1] - (sent[1] if driven else 0.0)
         spread = self._covariance @ regressor
-        gain = spread / (_NOISE_M**2 + regressor @ spread)
+        gain = spread / (self._noise_m**2 + regressor @ spread)
         self._aside = self._aside + gain * (beside - regressor @ self._aside)
         covariance = (self._covariance - np.outer(gain, spread)) / _FORGETTING
         # Not less certain than at the start: without legs aside, forgetting alone would wind the covariance up.

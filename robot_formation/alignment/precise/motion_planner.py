@@ -18,7 +18,7 @@ from robot_formation.geometry.footprint import footprint_gap_m
 from robot_formation.geometry.se2 import Motion, into_frame
 from robot_formation.parameters import parameter
 
-# All chosen; docs/alignment.md ("Constants") says how far runs depend on the costs and the spare room.
+# All chosen; docs/explanation/alignment.md ("Constants") says how far runs depend on the costs and the spare room.
 # Costs count in metres of way still to go.
 _LEG_COST_M = 0.02
 """Of each leg: a leg costs one of the timestep's moves."""

@@ -36,7 +36,7 @@ from robot_formation.parameters import parameter
 from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
-# All chosen; docs/alignment.md ("Constants") says how far runs depend on some of them.
+# All chosen; docs/explanation/alignment.md ("Constants") says how far runs depend on some of them.
 _KEPT_COST = 16.0
 """Hypotheses are kept up to so much more twice the negative log likelihood than the best has: four standard
 deviations."""

@@ -103,7 +103,7 @@ class PreciseAlignment:
         self._p = parameters
         self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
         self._planner = MotionPlanner(parameters.approach)
-        self._actuation = ActuationModel(parameters.actuation)
+        self._actuation = ActuationModel(parameters.actuation, parameters.filter.move_floor_m)
         self._search = NeighbourSearch(parameters.search)
         self._step_m = first_step_m
         self._formation = Motion(y_m=-formation_distance_m)  # position in the neighbour's frame

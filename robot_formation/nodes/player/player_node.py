@@ -295,7 +295,7 @@ class PlayerNode:
         return response
 
 
-class Executable:
+class PlayerExecutable:
     """The player as a node of its own."""
 
     def __init__(self, node: ParameterNode) -> None:

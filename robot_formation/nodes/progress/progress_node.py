@@ -41,7 +41,7 @@ class ProgressParameters:
     )
 
 
-class Executable:
+class ProgressExecutable:
     """Prints one line per timestep and follower on standard output, until a signal comes."""
 
     fixed: ClassVar[Mapping[str, str]] = {"*": "it decides on topics and lines; start another one"}

@@ -320,7 +320,7 @@ class RecorderNode:
         )
 
 
-class Executable:
+class RecorderExecutable:
     """The recorder as a node of its own."""
 
     def __init__(self, node: ParameterNode) -> None:

@@ -36,6 +36,21 @@ def test_a_drive_learns_its_slip_apart_from_legs_aside() -> None:
     assert actuation.overshoot == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("noise_m", [0.0002, 0.0007, 0.005])
+def test_a_first_drive_counts_by_its_variance_against_that_of_the_slip(noise_m: float) -> None:
+    actuation, length_m = ActuationModel(P, noise_m), 0.05
+    actuation.moved(Motion(length_m), Motion(length_m, 0.03 * length_m))
+    known, measured = (0.05 * length_m) ** 2, noise_m**2  # 0.05: the slip's standard deviation before any drive
+    assert actuation.slip == pytest.approx(0.03 * known / (known + measured))
+
+
+def test_drives_that_are_measured_without_error_can_be_learnt_from_again_and_again() -> None:
+    actuation = ActuationModel(P, 0.0)
+    for _ in range(50):
+        actuation.moved(Motion(0.05), Motion(0.05, 0.03 * 0.05))
+    assert actuation.slip == pytest.approx(0.03)
+
+
 def test_slip_and_overshoot_are_those_of_the_direction_after_the_turn() -> None:
     actuation, turn = ActuationModel(P), 0.4
     for _ in range(8):
