@@ -71,8 +71,7 @@ def _spread(arguments: Sequence[str]) -> list[str]:
     import importlib.util
 
     own = any(argument.startswith("-n") or argument == "no:xdist" for argument in arguments)
-    cores = len(os.sched_getaffinity(0))
-    workers = min(cores + 1, _MOST_WORKERS)  # one more: tests of the graph wait for nodes half of their time
-    if own or cores < 2 or importlib.util.find_spec("xdist") is None:
+    workers = min(len(os.sched_getaffinity(0)), _MOST_WORKERS)
+    if own or workers < 2 or importlib.util.find_spec("xdist") is None:
         return []
     return ["-n", str(workers), "--dist", "loadgroup"]

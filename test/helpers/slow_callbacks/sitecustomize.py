@@ -12,7 +12,7 @@ from typing import Any
 
 from robot_formation.nodes.host import signals
 
-LONGEST_S = 0.05
+LONGEST_S = 0.02
 _stop_on_signals = signals.stop_on_signals
 
 
