@@ -76,6 +76,7 @@ setup(
             "ruff",
             "scipy-stubs",
             "types-PyYAML",
+            "types-jsonschema",
         ],
     },
     entry_points={

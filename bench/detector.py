@@ -15,8 +15,7 @@ import itertools
 import json
 import statistics
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -24,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from cv2.typing import MatLike
 
+from fastest import fastest_ms
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.pixy2.color_table import ColorTable
 from robot_formation.vision.pixy2.detector import BlockDetector
@@ -78,16 +78,6 @@ def usual_pipeline(
     return found
 
 
-def fastest_ms(call: Callable[[], object]) -> float:
-    """Fastest of some calls, milliseconds."""
-    best = float("inf")
-    for _ in range(CALLS):
-        begin = time.perf_counter_ns()
-        call()
-        best = min(best, time.perf_counter_ns() - begin)
-    return best / 1e6
-
-
 def scene_picture(scene: str) -> npt.NDArray[np.uint8]:
     """The picture of a scene: an example, a grid of squares of the taught colours, or nothing but noise."""
     name, _ = SCENES[scene]
@@ -120,7 +110,7 @@ def measure(
         lambda: detector.process(image, next(clock)),
         lambda: usual_pipeline(image, ranges),
     )
-    times = [[fastest_ms(call) for call in calls] for _ in range(rounds)]
+    times = [[fastest_ms(call, CALLS) for call in calls] for _ in range(rounds)]
     return [statistics.median(column) for column in zip(*times, strict=True)]
 
 
@@ -145,7 +135,7 @@ def main() -> int:
         found = len(detector.detect(image))
         print(f"{scene:16} {found:6} {mine:12.3f} {tracked:14.3f} {usual:9.3f} {ratios[-1]:6.1f}")
     print(f"median ratio {statistics.median(ratios):.1f}, smallest {min(ratios):.1f}")
-    table = fastest_ms(lambda: ColorTable.of(signatures, parameters))
+    table = fastest_ms(lambda: ColorTable.of(signatures, parameters), CALLS)
     print(f"colour table, once per change: {table:.1f} ms")
     return 0
 

@@ -16,11 +16,11 @@ import math
 import statistics
 import sys
 import time
-from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
 
+from fastest import fastest_ms
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import Surface, make_surface
 from robot_formation.world.bullet import pybullet
@@ -133,16 +133,6 @@ class Tiny:
         return np.reshape(pixels, (self._size[1], self._size[0], 4))[..., :3]
 
 
-def fastest_ms(call: Callable[[], object]) -> float:
-    """Fastest of some calls, milliseconds."""
-    best = float("inf")
-    for _ in range(CALLS):
-        begin = time.perf_counter_ns()
-        call()
-        best = min(best, time.perf_counter_ns() - begin)
-    return best / 1e6
-
-
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15, help="interleaved rounds (default: 15)")
@@ -161,7 +151,7 @@ def main() -> int:
             found[count].append(min(driver.step_us() for _ in range(2)))
         for distance, calls in scenes.items():
             for name, call in calls.items():
-                found[distance, name].append(fastest_ms(call))
+                found[distance, name].append(fastest_ms(call, CALLS))
     value = {name: statistics.median(times) for name, times in found.items()}
     print(f"{'moving robots':>13} {'us per step':>12} {'real-time factor':>17}")
     for count in ROBOTS:

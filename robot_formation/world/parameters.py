@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 
 from robot_formation.parameters import Choice, ParameterError, parameter
 from robot_formation.vision.marker import MarkerKind
+from robot_formation.vision.overhead.lens import OverheadLens
 
 
 class DriveMode(Choice):
@@ -204,26 +205,12 @@ class CameraParameters:
 
 
 @dataclass(frozen=True)
-class OverheadParameters:
-    """Grey camera above the plate that looks straight down; its picture's top is the plate's far edge (+y).
-
-    Lens: OpenCV's model with five distortion coefficients.
-    """
+class OverheadParameters(OverheadLens):
+    """Grey camera above the plate that looks straight down; its picture's top is the plate's far edge (+y)."""
 
     enabled: bool = parameter(False, "take a picture at the start and whenever all robots have come to rest")
     width_px: int = parameter(512, "columns", unit="px", low=16, high=4096)
     height_px: int = parameter(512, "rows", unit="px", low=16, high=4096)
-    focal_length_px: float = parameter(560.0, "focal length in x and y", unit="px", low=10.0, high=1e5)
-    centre_x_px: float = parameter(257.3, "column of the optical axis", unit="px", low=-1e4, high=1e4)
-    centre_y_px: float = parameter(254.1, "row of the optical axis", unit="px", low=-1e4, high=1e4)
-    k1: float = parameter(-0.12, "radial distortion, second order", low=-1.0, high=1.0)
-    k2: float = parameter(0.02, "radial distortion, fourth order", low=-1.0, high=1.0)
-    p1: float = parameter(0.0006, "tangential distortion along rows", low=-0.1, high=0.1)
-    p2: float = parameter(-0.0004, "tangential distortion along columns", low=-0.1, high=0.1)
-    k3: float = parameter(0.0, "radial distortion, sixth order", low=-1.0, high=1.0)
-    x_m: float = parameter(0.89, "lens in the world", unit="m", low=-100.0, high=100.0)
-    y_m: float = parameter(0.89, "lens in the world", unit="m", low=-100.0, high=100.0)
-    z_m: float = parameter(2.5, "lens in the world", unit="m", low=0.3, high=100.0)
     blur_px: float = parameter(0.6, "standard deviation of the lens blur, 0 for none", unit="px", low=0.0, high=10.0)
     noise: float = parameter(1.5, "standard deviation of the sensor's noise, in 8-bit levels", low=0.0, high=50.0)
     floor_albedo: int = parameter(30, "grey of the floor around the plate, linear", low=0, high=255)

@@ -126,17 +126,37 @@ def write_many_kinds(path: Path) -> None:
             writer.write("/picture", cdr + bytes(-len(cdr) % 4), now)
 
 
+# What a busy machine may lose: best effort, and a topic whose publisher keeps one message while two are sent at once.
+MAY_BE_LOST = ("/loose", "/map")
+
+
+def assert_losses_are_told(recorded: list[bytes], sent: list[bytes], lost: int) -> None:
+    """What is recorded is in order; what is missing before its end is counted. All messages differ."""
+    places = [sent.index(message) for message in recorded]
+    assert places == sorted(set(places))
+    told = places[-1] + 1 if places else 0  # nobody can know of messages that were to follow
+    assert len(recorded) + lost == told
+
+
 def test_record_play_and_record_again_gives_the_same_messages_in_the_same_order(lab: BagLab, tmp_path: Path) -> None:
     write_many_kinds(tmp_path / "first")
     for source, target in (("first", "second"), ("second", "third")):
+        sent = payloads(tmp_path / source)
         recorder = lab.record("--all", "-o", tmp_path / target)
         played = lab.result(lab.formation("play", tmp_path / source, "--wait", "20", "--json"))
         assert played["unheard"] == []
-        assert played["messages"] == 20 * 105
+        assert played["messages"] == sum(map(len, sent.values()))
         assert set(played["schedule_error"]) == {"median_ms", "p99_ms", "worst_ms"}
         report = lab.end(recorder)
-        assert (report["dropped"], report["lost"]) == ({}, {}), report["topics"]
-        assert payloads(tmp_path / target) == payloads(tmp_path / source)
+        recorded = payloads(tmp_path / target)
+        assert report["dropped"] == {}
+        assert recorded.keys() == sent.keys()
+        for topic, messages in sent.items():
+            if topic in MAY_BE_LOST:
+                assert_losses_are_told(recorded[topic], messages, report["lost"].get(topic, 0))
+            else:
+                assert recorded[topic] == messages, topic
+                assert topic not in report["lost"]
     with read_bag(tmp_path / "third") as bag:
         offered = {topic.name: topic.profiles[0] for topic in bag.contents}
     assert (offered["/loose"].reliability, offered["/map"].durability) == ("best_effort", "transient_local")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from robot_formation.parameters import parameter
 from robot_formation.surface import Surface
+from robot_formation.vision.overhead.lens import OverheadLens
 
 Array = NDArray[np.float64]
 
@@ -21,24 +22,12 @@ _UNDISTORT_STOP = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-9)
 
 
 @dataclass(frozen=True)
-class Calibration:
-    """What a calibration holds: lens, place of the camera, and what is taken for the ground.
+class Calibration(OverheadLens):
+    """What a calibration holds: lens and place of the camera, and what is taken for the ground.
 
-    The camera looks straight down with its columns along the world's x; its distortion is OpenCV's model with five
-    coefficients. These defaults are the true values of the simulated camera: the good calibration.
+    The defaults are the true values of the simulated camera: the good calibration.
     """
 
-    focal_length_px: float = parameter(560.0, "focal length in x and y", unit="px", low=10.0, high=1e5)
-    centre_x_px: float = parameter(257.3, "column of the optical axis", unit="px", low=-1e4, high=1e4)
-    centre_y_px: float = parameter(254.1, "row of the optical axis", unit="px", low=-1e4, high=1e4)
-    k1: float = parameter(-0.12, "radial distortion, second order", low=-1.0, high=1.0)
-    k2: float = parameter(0.02, "radial distortion, fourth order", low=-1.0, high=1.0)
-    p1: float = parameter(0.0006, "tangential distortion along rows", low=-0.1, high=0.1)
-    p2: float = parameter(-0.0004, "tangential distortion along columns", low=-0.1, high=0.1)
-    k3: float = parameter(0.0, "radial distortion, sixth order", low=-1.0, high=1.0)
-    x_m: float = parameter(0.89, "lens in the world", unit="m", low=-100.0, high=100.0)
-    y_m: float = parameter(0.89, "lens in the world", unit="m", low=-100.0, high=100.0)
-    z_m: float = parameter(2.5, "lens in the world", unit="m", low=0.3, high=100.0)
     knows_surface: bool = parameter(True, "true: robots stand on the surface; false: on a level plane")
     plane_m: float = parameter(0.0, "height of that plane", unit="m", low=-10.0, high=10.0)
     stance_m: float = parameter(
