@@ -1,4 +1,4 @@
-"""Forks nodes for the tests' labs from one process that has imported what they need: the imports cost a second each.
+"""Forks nodes for the tests from one process that has imported what they need: the imports cost a second each.
 
 A script: `forked_nodes` starts it, once for each process of pytest, and it ends with that process. A request is one
 message on its standard input, a socket: a mapping, and the node's three streams as descriptors. Two answers follow: the
@@ -22,7 +22,10 @@ from robot_formation.launching.fork_server import die_with
 
 MOST_BYTES = 1 << 17
 """What a message may have."""
+COMMAND_LINE = "formation"
+"""The name by which the command line is asked for."""
 _COMMON = ("robot_formation.nodes.executables", "robot_formation.nodes.host.component_node")
+_OF_VERBS = ("robot_formation.cli.main", "robot_formation.nodes.host.session")
 
 
 def serve(requests: socket.socket, tests: int) -> int:
@@ -61,7 +64,10 @@ def serve(requests: socket.socket, tests: int) -> int:
 def _import_own(executable: str) -> None:
     from robot_formation.components.catalogue import KINDS
 
-    if executable in KINDS:
+    if executable == COMMAND_LINE:
+        for name in (*_OF_VERBS, *(f"robot_formation.nodes.{node}.{node}_node" for node in ("recorder", "player"))):
+            importlib.import_module(name)
+    elif executable in KINDS:
         KINDS[executable].classes()
     else:
         importlib.import_module(f"robot_formation.nodes.{executable}.{executable}_node")
@@ -78,6 +84,10 @@ def _node(request: Mapping[str, Any], streams: list[int], tests: int) -> int:
     sys.argv = [request["executable"], *request["arguments"]]
     setproctitle.setproctitle(" ".join(["robot_formation", *sys.argv]))
     die_with(tests)
+    if sys.argv[0] == COMMAND_LINE:
+        from robot_formation.cli.__main__ import main
+
+        return main()
     from robot_formation.nodes import executables
 
     return int(getattr(executables, sys.argv[0])())
