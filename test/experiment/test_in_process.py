@@ -18,7 +18,7 @@ from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.names import absolute
 from robot_formation.paths import config_dir
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("in_process")]
 
 TIMESTEPS = 5
 # Forecasts from three displacements may be as wild as their bound; bounded so, the follower can't touch the leader.

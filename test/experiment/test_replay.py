@@ -21,7 +21,7 @@ from robot_formation.experiment.replay_fine_tuner import replay_fine_tuner
 from robot_formation.launching.processes import run_metadata
 from robot_formation.parameters import ParameterError
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("replay")]
 
 TIMESTEPS = 6
 

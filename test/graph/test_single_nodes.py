@@ -26,7 +26,10 @@ pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("nodes")]
 def alone(name: str, namespace: str, *arguments: str, tmp_path: Path) -> tuple[int, str]:
     """Run a node that must end by itself; returns exit code and its last line."""
     words = ["--ros-args", "-r", f"__ns:={namespace}", *arguments]
-    with DomainReservation() as domain, ForkedNode(name, words, {**node_environment(domain, tmp_path), **STRICT}) as node:
+    with (
+        DomainReservation() as domain,
+        ForkedNode(name, words, {**node_environment(domain, tmp_path), **STRICT}) as node,
+    ):
         _, errors = node.communicate(timeout=60)
     assert "Traceback" not in errors
     return node.returncode, errors.strip().splitlines()[-1]

@@ -40,7 +40,7 @@ class NodeServer:
         with theirs:
             self._process = subprocess.Popen(
                 [sys.executable, str(SERVER), str(os.getpid())],
-                stdin=theirs,
+                stdin=theirs.fileno(),
                 env=dict(environment),
                 start_new_session=True,
             )
@@ -104,4 +104,4 @@ class ForkedNode(subprocess.Popen[str]):
             self.pid = server().fork(args[0], args[1:], environment, [pipes[0], pipes[3], pipes[5]])
             self._child_created = True
         finally:
-            self._close_pipe_fds(*pipes)
+            self._close_pipe_fds(*pipes)  # type: ignore[attr-defined]
