@@ -20,7 +20,7 @@ from typing import Any
 from graph_tools import STRICT
 from node_server import MOST_BYTES
 from robot_formation.launching.environment import node_environment
-from robot_formation.launching.fork_server import _adopting_orphans
+from robot_formation.launching.fork_server import adopting_orphans
 
 SERVER = Path(__file__).with_name("node_server.py")
 _OF_IMPORTS = ("PYTHON", "LD_LIBRARY_PATH")
@@ -58,7 +58,7 @@ class NodeServer:
         """
         assert _of_imports(environment) == _of_imports(self._environment), "this needs a process started on its own"
         request = {"executable": executable, "arguments": list(arguments), "environment": dict(environment)}
-        with _adopting_orphans():
+        with adopting_orphans():
             socket.send_fds(self._requests, [json.dumps(request).encode()], streams)
             answers = [self._requests.recv(MOST_BYTES) for _ in range(2)]
         assert all(answers), "the process that forks nodes has ended"
