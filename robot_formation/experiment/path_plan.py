@@ -52,23 +52,22 @@ def known_step(
 
 def path_start(
     leader: LeaderParameters, followers: int, heading_deg: float, distance_m: float, world: WorldNodeParameters
-) -> dict[str, float]:
-    """Return the start that puts everything that the formation sweeps in the plate's middle; nothing for `straight`.
+) -> tuple[float, float] | None:
+    """Return the start that puts everything that the formation sweeps in the plate's middle; None for `straight`.
 
-    Nothing either if path or plate can't be made, which `Scenario.check` tells.
+    None too if path or plate can't be made, which `Scenario.check` tells.
     """
     if leader.path == STRAIGHT or leader.path not in PATHS:
-        return {}
+        return None
     try:
         plate_m = plate_size(world.surface, world.surface_parameters)
         # A random walk goes where there is room, whatever its start.
         path = replace(leader, room_m=()).make_path()
     except ParameterError:
-        return {}
+        return None
     timesteps = 0 if leader.path == _WALK else leader.timesteps
     extent = swept(formation(world, followers, distance_m), path, timesteps, math.radians(heading_deg))
-    x_m, y_m = centred_start(extent, plate_m)
-    return {"start_x_m": x_m, "start_y_m": y_m}
+    return centred_start(extent, plate_m)
 
 
 def with_room(

@@ -169,8 +169,14 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
     leader = made(LeaderParameters, "leader", followers=_robots(setup)[1:], seed=setup.seed)
     distance_m = made(FineTunerNodeParameters, "fine_tuner").formation_distance_m
     ground = made(WorldNodeParameters, "world")
+    x_m, y_m = path_start(leader, setup.followers, setup.heading_deg, distance_m, ground) or (
+        setup.start_x_m,
+        setup.start_y_m,
+    )
     setup = replace(
-        setup, **_without(path_start(leader, setup.followers, setup.heading_deg, distance_m, ground), given)
+        setup,
+        start_x_m=setup.start_x_m if "start_x_m" in given else x_m,
+        start_y_m=setup.start_y_m if "start_y_m" in given else y_m,
     )
     world = made(WorldNodeParameters, "world", **_starts(setup, distance_m))
     own = settings.get("overhead_tracker", {})
@@ -188,10 +194,6 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         made(FineTunerNodeParameters, "fine_tuner", **first["fine_tuner"]),
         with_room(leader, world, setup.followers, distance_m),
     )
-
-
-def _without(values: Mapping[str, float], names: Collection[str]) -> dict[str, float]:
-    return {name: value for name, value in values.items() if name not in names}
 
 
 _KNOWN_FROM_ABOVE = ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters")

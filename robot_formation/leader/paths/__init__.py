@@ -34,6 +34,9 @@ PATHS: Mapping[str, type[PathKind]] = MappingProxyType({kind.name: kind for kind
 """Families of paths by name."""
 
 
+_NOTHING = Given()
+
+
 def path_kind(name: str) -> type[PathKind]:
     """Return the family of this name.
 
@@ -46,7 +49,7 @@ def path_kind(name: str) -> type[PathKind]:
     return kind
 
 
-def make_path(name: str, texts: Sequence[str] = (), given: Given = Given()) -> LeaderPath:
+def make_path(name: str, texts: Sequence[str] = (), given: Given = _NOTHING) -> LeaderPath:
     """Build a path from texts like 'period=12', the form that a ROS parameter can hold.
 
     Args:

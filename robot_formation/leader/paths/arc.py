@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from robot_formation.geometry.se2 import Motion
 from robot_formation.leader.paths.base import Curve, Direction, Heading, Point
 from robot_formation.leader.paths.straight import STEP
 from robot_formation.parameters import parameter

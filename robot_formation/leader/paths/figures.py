@@ -35,7 +35,7 @@ class Lemniscate(Curve):
 
 @dataclass(frozen=True)
 class Lissajous(Curve):
-    """Lissajous figure: x = a sin(p s), y = b sin(q s) with s = 2 pi (t / period + phase); a and b are half its sides."""
+    """Lissajous figure: x = a sin(p s), y = b sin(q s) with s = 2 pi (t / period + phase)."""
 
     name: ClassVar[str] = "lissajous"
     amplitude_m: float = parameter(0.3, "a, half of its length", unit="m", low=0.0, high=10.0)

@@ -47,8 +47,8 @@ class _Walk:
         room = given.room
         if min(room.ahead_m + room.behind_m, room.left_m + room.right_m) < 2.0 * self._step_m:
             raise ParameterError(
-                f"path 'random_walk': the plate leaves a room of {room.ahead_m + room.behind_m:.2f} x "
-                f"{room.left_m + room.right_m:.2f} m to the leader, which is too small for steps of {self._step_m:g} m; "
+                f"path 'random_walk': the plate leaves the leader a room of {room.ahead_m + room.behind_m:.2f} x "
+                f"{room.left_m + room.right_m:.2f} m, which is too small for steps of {self._step_m:g} m; "
                 "take a larger plate (world.surface_parameters size_m) or fewer followers"
             )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -82,7 +83,8 @@ def _numbers(path: Path, lines: Sequence[Sequence[str]], names: Sequence[str]) -
     for number, cells in enumerate(lines, start=2):
         if len(cells) != len(names):
             raise ParameterError(
-                f"{path}: line {number} has {len(cells)} values for {len(names)} columns; fill the gap or delete the line"
+                f"{path}: line {number} has {len(cells)} values for {len(names)} columns; "
+                "fill the gap or delete the line"
             )
         rows.append(tuple(_number(path, number, name, cell) for name, cell in zip(names, cells, strict=True)))
     return rows
@@ -103,7 +105,7 @@ def _looking_along(path: Path, rows: Sequence[Row], names: Sequence[str]) -> lis
     """Add to every point the direction to the next one, to the last one that of the one before."""
     first = 1 if names[0] == TIME else 0
     directions = []
-    for number, (before, after) in enumerate(zip(rows, rows[1:], strict=False), start=2):
+    for number, (before, after) in enumerate(itertools.pairwise(rows), start=2):
         dx, dy = after[first] - before[first], after[first + 1] - before[first + 1]
         if dx == dy == 0.0:
             raise ParameterError(
@@ -117,7 +119,7 @@ def _looking_along(path: Path, rows: Sequence[Row], names: Sequence[str]) -> lis
 def _between(poses: Sequence[Motion], scale: float) -> tuple[Motion, ...]:
     """Return the motions from pose to pose, turned by less than half a turn each."""
     motions = []
-    for before, after in zip(poses, poses[1:], strict=False):
+    for before, after in itertools.pairwise(poses):
         step = after.relative_to(before)
         motions.append(Motion(scale * step.x_m, scale * step.y_m, math.remainder(step.yaw_rad, 2.0 * math.pi)))
     return tuple(motions)
@@ -136,7 +138,7 @@ def _steps(path: Path, duration_s: float, step_s: float) -> int:
 
 def _resampled(path: Path, rows: Sequence[Row], step_s: float, *, with_heading: bool) -> list[Motion]:
     """Interpolate between rows of time, x, y and perhaps heading; headings the short way round."""
-    spans = [after[0] - before[0] for before, after in zip(rows, rows[1:], strict=False)]
+    spans = [after[0] - before[0] for before, after in itertools.pairwise(rows)]
     usual = sorted(spans)[len(spans) // 2]
     for number, span in enumerate(spans, start=3):
         if span <= 0.0:
