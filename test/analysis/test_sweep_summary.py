@@ -25,6 +25,7 @@ class Run:
     lost: bool = False
     track: str = "two"
     surface: str = "bowl"
+    path: str = "straight"
     prediction_coverage_90: float | None = 0.9
     correction_u_m: float | None = 0.02
     correction_v_m: float | None = 0.08
