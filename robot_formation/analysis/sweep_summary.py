@@ -149,7 +149,7 @@ def _ratio(own_m: float, other_m: float) -> float:
 
 def table(summary: Sequence[JsonObject]) -> str:
     """Print the summary as a Markdown table: cm, with intervals in brackets; paths only if not all are straight."""
-    named = ("track", "path", "surface", "predictor", "runs", "lost")
+    named: tuple[str, ...] = ("track", "path", "surface", "predictor", "runs", "lost")
     if all(entry["path"] == "straight" for entry in summary):
         named = tuple(name for name in named if name != "path")
     heads = (*named, "correction [cm]", "reduction [%]", "RMSE [cm]", "moves per step", "in 90 % ellipse [%]")

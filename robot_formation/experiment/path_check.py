@@ -147,7 +147,7 @@ class PathCheck:
         return True
 
     def _off_plate(self, path: LeaderPath) -> Problem | None:
-        """Find the first body beyond the plate's edge; on a straight path the first reference dot, as the world does."""
+        """Find the first body beyond the plate's edge; on a straight path the first reference dot, like the world."""
         if self.leader.path == STRAIGHT and not self.world.leaving_ends_run:
             return None
         if self.chosen:

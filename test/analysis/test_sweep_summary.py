@@ -25,13 +25,13 @@ class Run:
     lost: bool = False
     track: str = "two"
     surface: str = "bowl"
-    path: str = "straight"
     prediction_coverage_90: float | None = 0.9
     correction_u_m: float | None = 0.02
     correction_v_m: float | None = 0.08
     movements_per_timestep: float | None = 1.5
     formation_error_rmse_m: float | None = 0.01
     heading_error_rmse_rad: float | None = 0.03
+    path: str = "straight"
 
 
 def runs_of(predictor: str, corrections: Sequence[float | None], **others: Any) -> list[Run]:
