@@ -11,9 +11,9 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from robot_formation.geometry.se2 import Motion
 from robot_formation.leader.paths import Given, make_path, poses
 from robot_formation.leader.rigid_formation import Formation, room_around
-from robot_formation.geometry.se2 import Motion
 
 PICTURES = Path(__file__).parent.parent / "docs" / "pictures"
 PLATE_M, START = 1.78, Motion(0.7, 0.8, 0.5 * math.pi)

@@ -23,9 +23,10 @@ def follower_step(step: Motion, number: int, distance_m: float) -> Motion:
 
     T_n = O^-1 T O, where O leads from the leader to the follower's place, number * distance_m to its right.
     """
+    if not step.yaw_rad:
+        return step  # the same for all, without rounding
     place = Motion(0.0, -number * distance_m)
-    moved = place.inverse().then(step).then(place)
-    return Motion(moved.x_m, moved.y_m + 0.0, moved.yaw_rad)
+    return place.inverse().then(step).then(place)
 
 
 @dataclass(frozen=True)

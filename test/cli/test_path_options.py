@@ -32,7 +32,10 @@ def test_the_list_of_paths_has_their_parameters_with_defaults(capsys: pytest.Cap
         (["sweep", "--paths", "circel"], "no path 'circel'; did you mean 'circle'?"),
         (["sweep", "--paths", "teleop"], "no path 'teleop'"),
         (["sweep", "--set", "leader.path=circle"], "a sweep sets it itself"),
-        (["sweep", "--paths", "slalom", "--set", "leader.timesteps=28"], "seed 1: path 'slalom': leader would leave"),
+        (
+            ["sweep", "--tracks", "one", "--paths", "pulse", "--seeds", "0:2", "--set", "leader.timesteps=29"],
+            "seed 1: path 'pulse': leader would leave the plate",
+        ),
         (["path", "nowhere"], "nowhere"),
     ],
 )

@@ -18,7 +18,9 @@ MADE = [name for name in PATHS if name not in ("straight", "waypoints", "teleop"
 
 
 def scenario(path: str, *settings: str, parameters: str = "") -> Scenario:
-    return override(TRACK, [f"leader.path={path}", f"leader.path_parameters=[{parameters}]", *settings])
+    return override(
+        TRACK, ["heading_deg=90", f"leader.path={path}", f"leader.path_parameters=[{parameters}]", *settings]
+    )
 
 
 def boxes(made: Scenario) -> np.ndarray:
@@ -66,7 +68,7 @@ def test_a_files_start_belongs_to_its_path(tmp_path: Path) -> None:
 
 
 def test_a_random_walk_is_given_the_room_that_its_formation_has() -> None:
-    room = scenario("random_walk", "heading_deg=90").leader.room_m
+    room = scenario("random_walk").leader.room_m
     # Ahead and back half a plate less half a body and the margin; sideways less the follower too.
     assert room == pytest.approx([0.5 * (1.78 - 0.365) - 0.05] * 2 + [0.5 * (1.78 - 0.238 - 0.32) - 0.05] * 2)
 
@@ -114,7 +116,7 @@ def test_a_straight_leaders_followers_know_its_step_as_ever() -> None:
             "slalom", "", ["leader.timesteps=60"],
             ["leader would leave the plate of 1.78 x 1.78 m in timestep 2", "step_m=0.02", "size_m=", "timesteps=2"],
         ),
-        ("lemniscate", "amplitude_m=0.7, period=90", ["leader.timesteps=90"], ["leave the plate", "amplitude_m="]),
+        ("lemniscate", "amplitude_m=0.9, period=130", ["leader.timesteps=130"], ["leave the plate", "amplitude_m="]),
         ("circle", "", ["start_x_m=0.1", "start_y_m=0.9"], ["leader would leave the plate", "at the start"]),
         (
             "circle", "heading=along, radius_m=0.1", [],
@@ -140,7 +142,7 @@ def test_a_path_that_cannot_be_followed_is_refused(
         ("slalom", "", ["leader.timesteps=60"], "step_m"),
         ("slalom", "", ["leader.timesteps=60"], "leader.timesteps"),
         ("slalom", "", ["leader.timesteps=60"], "size_m"),
-        ("lemniscate", "amplitude_m=0.7, period=90", ["leader.timesteps=90"], "amplitude_m"),
+        ("lemniscate", "amplitude_m=0.9, period=130", ["leader.timesteps=130"], "amplitude_m"),
         ("lemniscate", "amplitude_m=1", [], "period"),
     ],
 )

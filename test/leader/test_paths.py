@@ -86,7 +86,7 @@ def test_the_leaders_step_is_the_default_of_a_paths_own(name: str) -> None:
     ],
 )
 def test_what_cannot_be_made_is_refused_in_one_line(name: str, texts: Sequence[str], said: str) -> None:
-    with pytest.raises(ParameterError, match=".") as error:
+    with pytest.raises(ParameterError) as error:
         make_path(name, texts)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
