@@ -55,8 +55,14 @@ class FineTunerParameters:
 
     mode: AlignmentModeName = parameter(AlignmentModeName.PRECISE, "How the camera's blocks are used")
     first_step_m: float = parameter(
-        0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
+        0.05,
+        "Displacement of timestep 1 along v, known beforehand: a scenario takes it from the leader's path",
+        unit="m",
+        low=-0.2,
+        high=0.2,
     )
+    first_step_u_m: float = parameter(0.0, "The same along u", unit="m", low=-0.1, high=0.1)
+    first_turn_rad: float = parameter(0.0, "Turn of timestep 1, known beforehand too", unit="rad", low=-1.1, high=1.1)
     formation_distance_m: float = parameter(
         FORMATION_DISTANCE_M,
         "Distance beside the neighbour that is kept, between the origins of base_link, along u",
@@ -67,7 +73,7 @@ class FineTunerParameters:
     # The bodies are 8 cm apart in a formation of 32 cm: a wild forecast must not push the neighbour.
     max_v_m: float = parameter(0.1, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2)
     max_u_m: float = parameter(
-        0.05, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
+        0.075, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
     )
     calibration_file: str = parameter(
         "", "YAML file of 'formation calibrate vision': its values go before those of 'alignment'; empty: none"
@@ -251,7 +257,7 @@ class FineTuner:
         )
         self._planned_move = motion
         collecting = self.timestep <= COLLECTION_TIMESTEPS
-        move = Motion(motion.x_m, motion.y_m, self._alignment.turn())
+        move = Motion(motion.x_m, motion.y_m, wish.yaw_rad + self._alignment.turn())
         actions: list[Action] = [
             State(AlignmentState.COLLECT if collecting else AlignmentState.PREDICT),
             *self._move(move),
@@ -262,7 +268,7 @@ class FineTuner:
 
     def _planned(self) -> Motion:
         if self.timestep == 1:
-            return Motion(x_m=self._p.first_step_m)
+            return Motion(self._p.first_step_m, 0.0 - self._p.first_step_u_m, self._p.first_turn_rad)
         if self.timestep <= COLLECTION_TIMESTEPS or self._prediction is None:
             return self._previous
         return self._prediction
