@@ -9,6 +9,7 @@ of its gradient. The sum of losses is at most that of the best expert plus a ter
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +17,33 @@ from numpy.typing import NDArray
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.models import Vector, array
 
+NU = 5.0
+"""Degrees of freedom of the errors' distribution (Student): an outlier must not decide."""
 
-class MlPoly:
+
+class Aggregation(Protocol):
     """Weights of experts of one quantity."""
 
-    def __init__(self, prior: Vector, scale: float, discount: float = 1.0) -> None:
+    @property
+    def weights(self) -> Vector:
+        """Weights (experts,) that add up to 1."""
+
+    def observe(self, forecasts: Vector, value: float) -> None:
+        """Judge the experts' forecasts (experts,) by the value that came."""
+
+    def state(self) -> JsonObject:
+        """Return all that it has learned."""
+
+    def restore(self, state: Mapping[str, Json]) -> None:
+        """Restore what `state` returned."""
+
+
+class MlPoly:
+    """Weights without a learning rate."""
+
+    def __init__(self, prior: Vector, scale: float) -> None:
         """Begin with the prior (experts,), which adds up to 1; losses are in units of `scale` squared."""
-        self._prior, self._scale, self._discount = prior, scale, discount
+        self._prior, self._scale = prior, scale
         self._regrets: NDArray[np.float64] = np.zeros(len(prior))
         self._squares: NDArray[np.float64] = np.zeros(len(prior))
         self._largest = 0.0
@@ -38,8 +59,8 @@ class MlPoly:
         """Judge the experts' forecasts (experts,) by the value that came."""
         mixed = float(self.weights @ forecasts)
         regrets = 2.0 * (mixed - value) * (mixed - forecasts) / self._scale**2
-        self._regrets = self._discount * self._regrets + regrets
-        self._squares = self._discount * self._squares + regrets**2
+        self._regrets = self._regrets + regrets
+        self._squares = self._squares + regrets**2
         self._largest = max(self._largest, float(np.abs(regrets).max()))
 
     def state(self) -> JsonObject:
@@ -63,6 +84,8 @@ class ExponentialWeights:
     def __init__(self, prior: Vector, scale: float, discount: float) -> None:
         """Begin with the prior (experts,); errors are in units of `scale`."""
         self._prior, self._scale, self._discount = np.log(prior), scale, discount
+        self.newest: Vector = np.zeros(len(prior))
+        """The newest loss of each expert, (experts,)."""
         self._losses: NDArray[np.float64] = np.zeros(len(prior))
 
     @property
@@ -75,7 +98,12 @@ class ExponentialWeights:
     def observe(self, forecasts: Vector, value: float) -> None:
         """Judge the experts' forecasts (experts,) by the value that came."""
         errors = ((forecasts - value) / self._scale) ** 2
-        self._losses = self._discount * self._losses + 6.0 * np.log1p(errors / 5.0)
+        self.newest = (NU + 1.0) * np.log1p(errors / NU)
+        self._losses = self._discount * self._losses + self.newest
+
+    def add(self, losses: Vector) -> None:
+        """Add to the experts' losses, where they were the first experts: a share of those of another axis."""
+        self._losses[: len(losses)] += losses
 
     def state(self) -> JsonObject:
         """Return all that it has learned."""

@@ -149,6 +149,8 @@ class Edmd:
     def __init__(self, parameters: PredictorParameters | EdmdParameters) -> None:
         p = self._p = parameters.edmd if isinstance(parameters, PredictorParameters) else parameters
         self._dictionary = dictionary_from_text(p.dictionary)
+        self.text = p.dictionary
+        """The dictionary in words."""
         self._rows = [row for row in self._dictionary.state_rows if row is not None]
         size = self._dictionary.size
         self._dmd: OnlineDMD | WindowedDMD = (

@@ -1,4 +1,4 @@
-"""Banks of Kalman filters of residual and leader-induced displacement, weighted by the likelihood of what they expected.
+"""Banks of Kalman filters of residual and leader-induced displacement, weighted by the likelihood of what came.
 
 Each filter has a state x = (r, z): the residual r of one axis, or of two, and a hidden state z whose linear readout C z
 is the leader-induced displacement w of the timestep to come. In a timestep r becomes r + C z + noise - total, the
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
-from robot_formation.koopman.predictors.models import Matrix, Vector, array, covariance
+from robot_formation.koopman.predictors.models import Matrix, Vector, covariance, packed, unpacked
 
 # Degrees of freedom of the innovations' distribution (Student): an outlier must not decide.
 NU = 5.0
@@ -49,53 +49,63 @@ class BankModel:
 class FilterBank:
     """The filters of a `BankModel`, in batches."""
 
-    def __init__(self, model: BankModel, camera: Vector, discount: float, horizon: int) -> None:
-        """Make a bank; `camera` (3,) holds the variances of the camera's residual along u, v and turn."""
+    def __init__(self, model: BankModel, discount: float, horizon: int) -> None:
+        """Make a bank that forgets past innovations by `discount` and is asked for up to `horizon` timesteps ahead."""
         self._m = model
-        self._camera = camera[model.axes]
         self._discount = discount
         self.means = model.means.copy()
         self._covariances = model.covariances.copy()
         self._prior = model.losses
         self._losses = np.zeros(len(model.losses))
         self._seen = model.axes.shape[1]
-        self._first = model.onward * 0.0 + np.eye(model.means.shape[1])
+        self._first = np.tile(np.eye(model.means.shape[1]), (len(model.means), 1, 1))
         self._first[:, : self._seen] += model.readout
+        self._first_turned = np.swapaxes(self._first, 1, 2)
+        self._onward_turned = np.swapaxes(model.onward, 1, 2)
         rows = [model.readout]
         for _ in range(horizon - 1):
             rows.append(rows[-1] @ model.onward)
         self._rows = np.stack(rows, axis=1)  # (count, horizon, seen, size)
 
-    def observe(self, total: Vector, residual: Vector | None) -> None:
-        """Update with a timestep's total (3,) and the residual (3,), told in the frame at its start; None: unseen."""
+    def observe(self, total: Vector, residual: Vector, camera: Vector) -> None:
+        """Update with a timestep's total (3,) and the residual (3,) at its end, told in the frame at its start.
+
+        `camera` (3,) is the residual's variance. A component of the residual that nobody saw is NaN.
+        """
         m, seen = self._m, self._seen
         means = np.einsum("bij,bj->bi", self._first, self.means)
         means[:, :seen] -= total[m.axes]
-        covariances = self._first @ self._covariances @ np.swapaxes(self._first, 1, 2)
+        covariances = self._first @ self._covariances @ self._first_turned
         for j in range(seen):
             covariances[:, j, j] += m.jitter[:, j]
-        if residual is not None:
+        values, variances_seen = residual[m.axes], camera[m.axes]
+        known = np.isfinite(values)
+        if known.any():
             losses = self._discount * self._losses
             for j in range(seen):
-                variances = covariances[:, j, j] + self._camera[:, j]
-                innovations = residual[m.axes[:, j]] - means[:, j]
-                gains = covariances[:, :, j] / variances[:, None]
+                variances = covariances[:, j, j] + variances_seen[:, j]
+                innovations = np.where(known[:, j], values[:, j] - means[:, j], 0.0)
+                gains = covariances[:, :, j] * (known[:, j] / variances)[:, None]
                 means = means + gains * innovations[:, None]
                 covariances = covariances - gains[:, :, None] * covariances[:, j, None, :]
-                losses = losses + (NU + 1.0) * np.log1p(innovations**2 / (NU * variances)) + np.log(variances)
+                misfit = (NU + 1.0) * np.log1p(innovations**2 / (NU * variances)) + np.log(variances)
+                losses = losses + np.where(known[:, j], misfit, 0.0)
             self._losses = losses
         self.means = np.einsum("bij,bj->bi", m.onward, means)
-        covariances = m.onward @ covariances @ np.swapaxes(m.onward, 1, 2) + m.noise
+        covariances = m.onward @ covariances @ self._onward_turned + m.noise
         self._covariances = (covariances + np.swapaxes(covariances, 1, 2)) / 2.0
 
     @property
     def losses(self) -> NDArray[np.float64]:
         """-2 log of the weights (count,), with the prior."""
-        return self._losses + self._prior
+        return np.asarray(self._losses + self._prior)
 
     def ahead(self, steps: int) -> NDArray[np.float64]:
         """Leader-induced displacements to come of every filter, (count, steps, seen)."""
-        return np.einsum("bhsj,bj->bhs", self._rows[:, :steps], self.means)
+        rows = self._rows
+        while rows.shape[1] < steps:
+            rows = np.concatenate([rows, rows[:, -1:] @ self._m.onward[:, None]], axis=1)
+        return np.asarray(np.einsum("bhsj,bj->bhs", rows[:, :steps], self.means))
 
     def shift(self, change: Vector) -> None:
         """Add a change (3,) to every filter's residual."""
@@ -104,16 +114,18 @@ class FilterBank:
     def state(self) -> JsonObject:
         """Return all that it has learned."""
         return {
-            "means": self.means.tolist(),
-            "covariances": self._covariances.tolist(),
-            "losses": self._losses.tolist(),
+            "means": packed(self.means),
+            "covariances": packed(self._covariances),
+            "losses": packed(self._losses),
         }
 
     def restore(self, state: Mapping[str, Json]) -> None:
         """Restore what `state` returned."""
-        self.means = array(state["means"], *self.means.shape)
-        self._covariances = covariance(state["covariances"], *self._covariances.shape)
-        self._losses = array(state["losses"], *self._losses.shape)
+        self.means = unpacked(state["means"], *self.means.shape)
+        self._covariances = covariance(
+            unpacked(state["covariances"], *self._covariances.shape), *self._covariances.shape
+        )
+        self._losses = unpacked(state["losses"], *self._losses.shape)
 
 
 def weighted(losses: NDArray[np.float64]) -> NDArray[np.float64]:

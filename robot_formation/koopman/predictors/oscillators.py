@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.koopman.predictors.filter_bank import BankModel, conditioned
-from robot_formation.koopman.predictors.models import Matrix, Vector
 from robot_formation.koopman.predictors.parameters import ClosingParameters, OscillatorParameters
 
 
@@ -36,9 +35,7 @@ class Known:
         self.camera = np.array([p.residual_u_m, p.residual_v_m, p.residual_turn_rad]) ** 2
 
 
-def trends(
-    known: Known, axis: int, settings: Iterable[tuple[float, float, float, float, float]]
-) -> BankModel:
+def trends(known: Known, axis: int, settings: Iterable[tuple[float, float, float, float, float]]) -> BankModel:
     """Make filters (r, level, trend) of an axis from (noise, level, trend, damping, first trend) of each."""
     rows = list(settings)
     scale = known.scale[axis]
