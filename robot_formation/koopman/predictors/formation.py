@@ -19,7 +19,7 @@ from robot_formation.koopman.predictors.closing import ActuationBias
 from robot_formation.koopman.predictors.experts import BankExpert, DmdExpert, Expert
 from robot_formation.koopman.predictors.horizon import MOST_STEPS
 from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Vector, vector
-from robot_formation.koopman.predictors.oscillators import Known, joined, oscillators, trends, turning
+from robot_formation.koopman.predictors.oscillators import Known, joined, oscillators, periods_of, trends, turning
 from robot_formation.koopman.predictors.parameters import EdmdParameters, PredictorParameters
 from robot_formation.koopman.predictors.spatial import rotated
 
@@ -212,7 +212,7 @@ def _experts(parameters: PredictorParameters, known: Known, chosen: Sequence[str
         for trend, damping in zip(p.trend_m, p.trend_damping, strict=True)
     ]
     o = p.oscillators
-    periods = np.geomspace(o.shortest, o.longest, o.count)
+    periods = periods_of(o)
     some = periods[::2]
     persistence = BankExpert(joined([trends(known, axis, levels) for axis in range(3)]), closing.discount)
 

@@ -116,6 +116,17 @@ def turning(known: Known, p: OscillatorParameters, periods: NDArray[np.float64],
     )
 
 
+def periods_of(p: OscillatorParameters) -> NDArray[np.float64]:
+    """Return the bank's periods (count,): evenly spaced in the square root of frequency.
+
+    What tells two frequencies apart is the phase between them after some timesteps, whatever the period; but long
+    periods have to be told apart by fewer periods. Evenly spaced periods waste filters on long ones, evenly spaced
+    frequencies on short ones.
+    """
+    roots = np.linspace(p.longest**-0.5, p.shortest**-0.5, p.count)
+    return np.asarray(roots**-2.0)
+
+
 def rotations(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return matrices (n, 2, 2) of rotations by angles (n,)."""
     cosines, sines = np.cos(angles), np.sin(angles)

@@ -146,17 +146,17 @@ class ClosingParameters:
 
 @dataclass(frozen=True)
 class OscillatorParameters:
-    """Bank of Koopman oscillators: periods in timesteps, geometrically spaced, and what the filters assume."""
+    """Bank of Koopman oscillators: periods in timesteps, evenly spaced in the root of frequency; what filters assume."""
 
     shortest: float = parameter(5.0, "Shortest period", unit="timesteps", low=2.1, high=1000.0)
     longest: float = parameter(80.0, "Longest period", unit="timesteps", low=2.1, high=10000.0)
-    count: int = parameter(56, "How many periods", low=2, high=1000)
-    level_start_m: float = parameter(0.04, "Standard deviation of the level at first", unit="m", low=1e-6, high=1.0)
-    amplitude_m: float = parameter(0.04, "Standard deviation of amplitudes at first", unit="m", low=1e-6, high=1.0)
+    count: int = parameter(72, "How many periods", low=2, high=1000)
+    level_start_m: float = parameter(0.02, "Standard deviation of the level at first", unit="m", low=1e-6, high=1.0)
+    amplitude_m: float = parameter(0.03, "Standard deviation of amplitudes at first", unit="m", low=1e-6, high=1.0)
     noise_m: float = parameter(
         0.0016, "Standard deviation of the leader-induced displacement about the model", unit="m", low=1e-6, high=1.0
     )
-    level_m: float = parameter(0.0004, "Standard deviation of the level's change", unit="m", low=0.0, high=1.0)
+    level_m: float = parameter(0.0002, "Standard deviation of the level's change", unit="m", low=0.0, high=1.0)
     change_m: float = parameter(0.0004, "Standard deviation of the amplitudes' change", unit="m", low=0.0, high=1.0)
     discount: float = parameter(0.95, "Weight of a past innovation relative to the next newer one", low=0.01, high=1.0)
 
