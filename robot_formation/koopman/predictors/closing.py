@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -256,7 +257,7 @@ class Closing:
             notes[name] = np.array2string(value, precision=6, separator=", ")
         for name, turn in (("residual turn [rad]", residual[2]), ("actuation bias of the turn [rad]", bias[2])):
             notes[name] = f"{turn:.6g}"
-        return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
+        return replace(inner, notes=notes)
 
     def state(self) -> JsonObject:
         """Return all that it has learned."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,7 @@ class Formation:
         known = Known(closing)
         self._camera = known.camera
         self._bounds = np.array([parameters.max_u_m, parameters.max_v_m, parameters.max_turn_rad])
+        self._periods = periods_of(p.oscillators)
         self.experts = _experts(parameters, known, chosen)
         prior = np.array([_PRIORS[name] for name in chosen])
         self._coupling = p.coupling
@@ -158,14 +160,17 @@ class Formation:
                 if "delay" in expert.model.text:
                     break
         weights = self.weights()
-        for axis, shares in weights.items():
-            notes[f"weights along {axis}"] = ", ".join(f"{name} {share:.3f}" for name, share in shares.items())
+        for along, of_axis in weights.items():
+            notes[f"weights along {along}"] = ", ".join(f"{name} {share:.3f}" for name, share in of_axis.items())
+        if (bank := self.experts.get("oscillators")) is not None and isinstance(bank, BankExpert):
+            for axis, shares in bank.weights().items():
+                notes[f"likeliest period along {AXES[axis]}"] = f"{self._periods[int(np.argmax(shares))]:.1f}"
         residual, bias = self.residual, self.bias()
         for name, value in (("residual [m]", residual[:2]), ("actuation bias [m]", bias[:2])):
             notes[name] = np.array2string(value, precision=6, separator=", ")
         for name, turn in (("residual turn [rad]", residual[2]), ("actuation bias of the turn [rad]", bias[2])):
             notes[name] = f"{turn:.6g}"
-        return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes, weights)
+        return replace(inner, notes=notes, weights=weights)
 
     def weights(self) -> dict[str, dict[str, float]]:
         """Weight of each expert along each axis for which it speaks."""

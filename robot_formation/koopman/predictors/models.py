@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.parameters import PredictorParameters, TrendParameters
+from robot_formation.koopman.quality import EigenvalueQuality
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -31,6 +32,10 @@ class Diagnostics:
     notes: Mapping[str, str] | None = None
     weights: Mapping[str, Mapping[str, float]] | None = None
     """Of a predictor's experts, by axis and name."""
+    consistency: float | None = None
+    """Consistency index of the dictionary; see `consistency_index`."""
+    qualities: Sequence[EigenvalueQuality] | None = None
+    """What the newest pairs say of K's eigenvalues."""
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128] | None:

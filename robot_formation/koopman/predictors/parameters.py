@@ -146,7 +146,7 @@ class ClosingParameters:
 
 @dataclass(frozen=True)
 class OscillatorParameters:
-    """Bank of Koopman oscillators: periods in timesteps, evenly spaced in the root of frequency; what filters assume."""
+    """Bank of Koopman oscillators: periods in timesteps, evenly spaced in the root of frequency."""
 
     shortest: float = parameter(5.0, "Shortest period", unit="timesteps", low=2.1, high=1000.0)
     longest: float = parameter(80.0, "Longest period", unit="timesteps", low=2.1, high=10000.0)
