@@ -58,9 +58,7 @@ class FilterBank:
         self._prior = model.losses
         self._losses = np.zeros(len(model.losses))
         self._seen = model.axes.shape[1]
-        self._first = np.tile(np.eye(model.means.shape[1]), (len(model.means), 1, 1))
-        self._first[:, : self._seen] += model.readout
-        self._first_turned = np.swapaxes(self._first, 1, 2)
+        self._readout_turned = np.swapaxes(model.readout, 1, 2)
         self._onward_turned = np.swapaxes(model.onward, 1, 2)
         rows = [model.readout]
         for _ in range(horizon - 1):
@@ -73,9 +71,11 @@ class FilterBank:
         `camera` (3,) is the residual's variance. A component of the residual that nobody saw is NaN.
         """
         m, seen = self._m, self._seen
-        means = np.einsum("bij,bj->bi", self._first, self.means)
-        means[:, :seen] -= total[m.axes]
-        covariances = self._first @ self._covariances @ self._first_turned
+        means = self.means.copy()
+        means[:, :seen] += np.einsum("bij,bj->bi", m.readout, self.means) - total[m.axes]
+        covariances = self._covariances.copy()  # of (r + C z, z): rows of r first, then its columns
+        covariances[:, :seen] += m.readout @ covariances
+        covariances[:, :, :seen] += covariances @ self._readout_turned
         for j in range(seen):
             covariances[:, j, j] += m.jitter[:, j]
         values, variances_seen = residual[m.axes], camera[m.axes]

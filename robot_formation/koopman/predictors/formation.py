@@ -218,7 +218,7 @@ def _experts(parameters: PredictorParameters, known: Known, chosen: Sequence[str
     ]
     o = p.oscillators
     periods = periods_of(o)
-    some = periods[::2]
+    some = periods[::3]
     persistence = BankExpert(joined([trends(known, axis, levels) for axis in range(3)]), closing.discount)
 
     def made(name: str) -> Expert:
