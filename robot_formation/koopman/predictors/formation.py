@@ -50,6 +50,7 @@ class Formation:
         self._camera = known.camera
         self._bounds = np.array([parameters.max_u_m, parameters.max_v_m, parameters.max_turn_rad])
         self._periods = periods_of(p.oscillators)
+        self._parameters, self._chosen = parameters, chosen
         self.experts = _experts(parameters, known, chosen)
         prior = np.array([_PRIORS[name] for name in chosen])
         self._coupling = p.coupling
@@ -68,11 +69,15 @@ class Formation:
         self._bias = ActuationBias(closing)
         self._seen = np.zeros(3, dtype=bool)
         self._last_turn = 0.0
+        self._begun = False
 
     def observe(self, displacement: Vector, residual: Vector | None, commanded: Vector | None) -> None:
         """Update with a timestep's total (3,), its residual (3,) and its command (3,), where they are known."""
         if commanded is not None:
             self._bias.observe(displacement, commanded)
+        if not self._begun and residual is None:
+            self._begin_with(displacement)
+        self._begun = True
         seen = np.full(3, np.nan) if residual is None else residual
         self._seen |= np.isfinite(seen)
         turn = float(displacement[2])
@@ -92,6 +97,13 @@ class Formation:
         if turn:  # on from the frame at the timestep's start to that at its end
             uv = self.residual[:2]
             self._shift(rotated(uv, -turn) - uv)
+
+    def _begin_with(self, displacement: Vector) -> None:
+        """Forget what was known beforehand of the leader's step: this log has no residuals, and may be of anything."""
+        known = Known(self._closing)
+        known.step, known.step_sigma = displacement, np.sqrt(_EXACT)
+        self.experts = _experts(self._parameters, known, self._chosen)
+        self._estimate()
 
     def _judge(self, ideal: Vector) -> None:
         """Weigh the experts by the ideal move (3,) that came; NaN where the turn was not seen."""
@@ -188,6 +200,7 @@ class Formation:
             "bias": self._bias.state(),
             "seen": [bool(seen) for seen in self._seen],
             "last_turn": self._last_turn,
+            "begun": self._begun,
         }
 
     def restore(self, state: Mapping[str, Json]) -> None:
@@ -201,6 +214,7 @@ class Formation:
         if len(seen) != 3:
             raise ValueError("what was seen has another length")
         self._seen = np.array([bool(value) for value in seen])
+        self._begun = bool(state["begun"])
         (self._last_turn,) = vector([state["last_turn"]], 1).tolist()
         self._estimate()
 
