@@ -250,7 +250,7 @@ def _experts(parameters: PredictorParameters, known: Known, chosen: Sequence[str
             return BankExpert(turning(known, o, signed, level=False), o.discount)
         if name == "dmd":
             return DmdExpert(EdmdParameters(dictionary="identity", prior=1e-3), persistence)
-        delays = p.edmd if name == "delays 3" else EdmdParameters(dictionary="constant identity delay:6", prior=1.0)
+        delays = p.edmd if name == "delays 3" else EdmdParameters(dictionary="constant delay:6", prior=1.0)
         return DmdExpert(delays, persistence)
 
     return {name: made(name) for name in chosen}

@@ -189,7 +189,7 @@ class FormationParameters:
     trend_start_m: float = parameter(
         0.002, "Trend filters: standard deviation of the trend at first", unit="m", low=0.0, high=1.0
     )
-    edmd: EdmdParameters = EdmdParameters(dictionary="constant identity delay:3", prior=0.05)
+    edmd: EdmdParameters = EdmdParameters(dictionary="constant delay:3", prior=0.05)
     oscillators: OscillatorParameters = OscillatorParameters()
 
     def __post_init__(self) -> None:

@@ -78,7 +78,7 @@ def test_the_likelihood_finds_the_period() -> None:
     rng = np.random.default_rng(1)
     for value in pulse(50, 14.0):
         seen = np.array([0.0, rng.normal(0.0, 0.001), 0.0])
-        bank.observe(value + [0.0, rng.normal(0.0, 0.0015), 0.0], seen, known.camera)
+        bank.observe(value + np.array([0.0, rng.normal(0.0, 0.0015), 0.0]), seen, known.camera)
     assert periods[np.argmin(bank.losses)] == pytest.approx(14.0, rel=0.05)
 
 
@@ -158,7 +158,7 @@ def test_exponential_weights_go_to_the_best_expert_and_leave_one_that_fails() ->
 
 
 def follow(found: Predictor, w: Array, seed: int = 0, blind: tuple[int, ...] = ()) -> Array:
-    """Errors (n, 3) of the forecasts along a leader's steps (n, 3), by a follower that obeys them; noise as in a run."""
+    """Errors (n, 3) of the forecasts along a leader's steps (n, 3) of a follower that obeys them."""
     rng, r, errors = np.random.default_rng(seed), np.zeros(3), np.full((len(w), 3), np.nan)
     command = w[0]
     for t, step in enumerate(w):

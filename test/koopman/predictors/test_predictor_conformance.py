@@ -269,7 +269,7 @@ def test_diagnostics_show_k_with_its_eigenvalues_where_there_is_one(name: str) -
     for x in HISTORY:
         found.observe(whole(x))
     diagnostics = found.diagnostics()
-    size = {"measured": 2, "literal": 2, "edmd": 3, "formation": 11}.get(name.removesuffix("+close"))
+    size = {"measured": 2, "literal": 2, "edmd": 3, "formation": 9}.get(name.removesuffix("+close"))
     if size is None:
         assert (diagnostics.k, diagnostics.eigenvalues, diagnostics.condition_number) == (None, None, None)
         return
