@@ -27,9 +27,9 @@ from robot_formation.koopman.predictors.spatial import rotated
 AXES = ("u", "v", "turn")
 # Displacements are all there is where no residual was ever seen: so finely are they taken as they are.
 _EXACT = np.array([1e-4, 1e-4, 1e-3]) ** 2
-# How much each expert is believed at first.
+# How much each expert is believed at first, one by one; persistence gets its weight from 'initial_loss'.
 _PRIORS = {
-    "persistence": 8.0,
+    "persistence": 1.0,
     "trends": 1.0,
     "oscillators": 2.0,
     "overtones": 1.0,
@@ -52,7 +52,8 @@ class Formation:
         self._periods = periods_of(p.oscillators)
         self._parameters, self._chosen = parameters, chosen
         self.experts = _experts(parameters, known, chosen)
-        prior = np.array([_PRIORS[name] for name in chosen])
+        first = {**_PRIORS, "persistence": math.exp(p.initial_loss)}
+        prior = np.array([first[name] for name in chosen])
         self._coupling = p.coupling
         self._aggregations: list[Aggregation] = []
         self._speak: list[NDArray[np.int64]] = []
