@@ -2,7 +2,7 @@
 
 A follower obeys its predictor; its camera sees what is left with the noise of the paper mode (6 mm along u, 1 mm along
 v), and corrects what is beyond the tolerances (1.5 cm along u, 6 mm along v). The leader's steps have noise of 1 mm and
-1.5 mm, the follower's moves a constant bias and 1 mm of noise. There is no slip, no lean and no detector: whole runs in
+1.5 mm, the follower's moves a constant bias and 1 mm of noise. There is no slip, no tilt and no detector: whole runs in
 the simulated world decide. Every path takes a random phase from the seed; the first step is known beforehand.
 
 Printed are, per path, mean correction distance [cm] of timesteps 4 to the end and RMSE [mm] of the prediction move

@@ -32,7 +32,7 @@ class OneStepForecasts:
         covariances_m2: (n, 2, 2) of the ideal move about the forecast, square metres.
         error_m: n, RMSE, median and largest |error| in metres, share inside the 90 % ellipse; see `error_statistics`.
         horizon: the same of the ways of 1, 2, ... timesteps, with `h`; empty if not asked for.
-        insight: K and what is known of it at the log's end; see `insight_of`.
+        model: K and what is known of it at the log's end; see `model_of`.
     """
 
     name: str
@@ -40,7 +40,7 @@ class OneStepForecasts:
     covariances_m2: NDArray[np.float64]
     error_m: Mapping[str, float | None]
     horizon: tuple[Mapping[str, float | None], ...] = ()
-    insight: Mapping[str, object] = field(default_factory=dict)
+    model: Mapping[str, object] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
         """Return what the command line's JSON says of a predictor."""
@@ -49,7 +49,7 @@ class OneStepForecasts:
             "covariance": _rows(self.covariances_m2),
             "error_m": dict(self.error_m),
             **({"horizon": [dict(found) for found in self.horizon]} if self.horizon else {}),
-            **self.insight,
+            **self.model,
         }
 
 
@@ -86,7 +86,7 @@ def forecast_log(log: DisplacementLog, parameters: PredictorParameters, horizon:
     statistics = error_statistics(log.targets_m - means, covariances)
     horizons = tuple({"h": float(h), **_way_statistics(log, ahead, h)} for h in range(1, horizon + 1))
     return OneStepForecasts(
-        parameters.name, means, covariances, statistics, horizons, insight_of(predictor.diagnostics())
+        parameters.name, means, covariances, statistics, horizons, model_of(predictor.diagnostics())
     )
 
 
@@ -108,7 +108,7 @@ def _way_statistics(log: DisplacementLog, ahead: Sequence[Sequence[Ahead]], h: i
     return error_statistics(np.array(errors).reshape(count, 2), np.array(covariances).reshape(count, 2, 2))
 
 
-def insight_of(diagnostics: Diagnostics) -> dict[str, object]:
+def model_of(diagnostics: Diagnostics) -> dict[str, object]:
     """Return what the command line's JSON says of a model: K, eigenvalues with their periods, weights.
 
     Returns:

@@ -21,7 +21,7 @@ from robot_formation.koopman.predictors import NAMES, Predictor, PredictorParame
 from synthetic_bag import POSE_COVARIANCE, Step, SyntheticRun, pose_with_covariance
 
 ERRORS = ["n", "rmse_u", "rmse_v", "rmse", "median", "worst", "coverage_90"]
-INSIGHT = {"k", "condition_number", "eigenvalues", "consistency_index", "weights"}
+OF_MODEL = {"k", "condition_number", "eigenvalues", "consistency_index", "weights"}
 STEPS = [
     Step(moved=(0.010, 0.050), residual=(0.001, 0.002)),
     Step(moved=(0.012, 0.051), residual=(-0.001, 0.0)),
@@ -82,7 +82,7 @@ def test_json_holds_forecast_covariance_and_errors_of_each_predictor_and_nothing
     assert list(found["predictors"]) == list(NAMES)
     for values in found["predictors"].values():
         assert list(values)[:3] == ["forecast", "covariance", "error_m"]
-        assert set(values) - {"forecast", "covariance", "error_m"} == INSIGHT
+        assert set(values) - {"forecast", "covariance", "error_m"} == OF_MODEL
         assert values["forecast"][0] is None
         assert values["covariance"][0] is None
         assert np.array(values["forecast"][1:]).shape == (11, 2)
@@ -145,7 +145,7 @@ def test_a_single_row_has_no_forecast_and_no_errors(capsys: pytest.CaptureFixtur
     path.write_text("u_m,v_m\n0.01,0.05\n")
     found = forecasts(capsys, path, "--predictor", "measured")["measured"]
     nothing = {"forecast": [None], "covariance": [None], "error_m": {**dict.fromkeys(ERRORS), "n": 0}}
-    assert found == {**nothing, **dict.fromkeys(INSIGHT)}
+    assert found == {**nothing, **dict.fromkeys(OF_MODEL)}
     said = predict(capsys, path)
     assert next(line for line in said.out.splitlines() if line.startswith("measured")).split()[1:] == ["0", *["-"] * 6]
     assert (tmp_path / "log_forecasts.png").stat().st_size > 5000
@@ -345,7 +345,7 @@ def test_k_with_eigenvalues_and_their_periods_is_told_where_there_is_one(
     capsys: pytest.CaptureFixture[str], foreign: Path
 ) -> None:
     found = forecasts(capsys, foreign, *OWN, "--skip-bad", "--predictors", "previous,formation,measured")
-    assert {found["previous"][key] for key in INSIGHT} == {None}
+    assert {found["previous"][key] for key in OF_MODEL} == {None}
     assert np.array(found["measured"]["k"]).shape == (2, 2)
     eigenvalues = found["formation"]["eigenvalues"]
     assert any(row["period"] == pytest.approx(2.0 * np.pi / 0.45, rel=0.1) for row in eigenvalues if row["period"])
