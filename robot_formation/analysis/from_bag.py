@@ -116,11 +116,12 @@ def load_displacements(path: str | Path, robot: str, namespace: str | None = Non
         raise AnalysisError(f"{path} has no displacements of '{robot}'; give the bag of a run with finished timesteps")
     by_stamp = [{entry.stamp_ns: entry.motion for entry in _stamped(messages[topic])} for topic in topics]
     stamps = sorted(by_stamp[0])
-    columns = [
+    displacements, residuals, commanded = (
         np.array([(found[stamp].u_m, found[stamp].v_m) if stamp in found else (math.nan, math.nan) for stamp in stamps])
         for found in by_stamp
-    ]
-    return DisplacementLog(str(path), tuple(f"timestep {t}" for t in range(1, len(stamps) + 1)), *columns)
+    )
+    places = tuple(f"timestep {t}" for t in range(1, len(stamps) + 1))
+    return DisplacementLog(str(path), places, displacements, residuals, commanded, np.zeros(len(stamps)))
 
 
 def _require_displacements(bag: FormationBag, robot: str) -> None:
