@@ -29,7 +29,7 @@ class PredictorComponent(Component):
         super().__init__(place)
         state_file = parameters.state_file.replace("{robot}", place.robot)
         self._state_file = Path(state_file) if state_file else None
-        self._predictor = self._restored(parameters)
+        self.predictor = self._restored(parameters)
         # By stamp, then topic: (u, v) [m] with a turn of 0, None where there is no estimate.
         self._parts: dict[int, dict[names.Topic, Message]] = {}
         self._first_commanded_ns: int | None = None
@@ -57,7 +57,7 @@ class PredictorComponent(Component):
             return
         unfinished = self._state_file.with_name(self._state_file.name + ".partial")
         try:
-            unfinished.write_text(json.dumps(self._predictor.state()), encoding="utf-8")
+            unfinished.write_text(json.dumps(self.predictor.state()), encoding="utf-8")
             unfinished.replace(self._state_file)
         except OSError as error:
             self.warn(f"can't keep the predictor's state: {error}")
@@ -75,8 +75,8 @@ class PredictorComponent(Component):
 
     def details(self) -> dict[str, str]:
         """See `Component`."""
-        diagnostics = self._predictor.diagnostics()
-        values = {"predictor": self._predictor.name, "timesteps": str(self._predictor.observations)}
+        diagnostics = self.predictor.diagnostics()
+        values = {"predictor": self.predictor.name, "timesteps": str(self.predictor.observations)}
         for name, array in (
             ("K", diagnostics.k),
             ("eigenvalues", diagnostics.eigenvalues),
@@ -99,9 +99,9 @@ class PredictorComponent(Component):
 
     def actuation_bias(self) -> tuple[float, float]:
         """By how much (u, v) the robot is expected to go farther than told, metres; zero if that isn't learned."""
-        if not self._predictor.observations:
+        if not self.predictor.observations:
             return (0.0, 0.0)
-        forecast = self._predictor.predict()
+        forecast = self.predictor.predict()
         u_m, v_m, _ = (forecast.mean - forecast.command).tolist()
         return (u_m, v_m)
 
@@ -147,11 +147,11 @@ class PredictorComponent(Component):
         if displacement is not None:
             commanded = parts[names.COMMANDED] if expected else None
             try:
-                self._predictor.observe(displacement, parts[names.RESIDUAL], commanded)
+                self.predictor.observe(displacement, parts[names.RESIDUAL], commanded)
             except PredictionError as error:
                 self.warn(str(error))
         try:
-            forecast = self._predictor.predict()
+            forecast = self.predictor.predict()
         except PredictionError as error:
             self.warn(f"{error}; answering with no motion")
             self._send_prediction(Motion(), conversions.NO_ESTIMATE)
