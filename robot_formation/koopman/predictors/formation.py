@@ -20,7 +20,14 @@ from robot_formation.koopman.predictors.closing import ActuationBias
 from robot_formation.koopman.predictors.experts import BankExpert, DmdExpert, Expert
 from robot_formation.koopman.predictors.horizon import MOST_STEPS
 from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Vector, vector
-from robot_formation.koopman.predictors.oscillators import Known, joined, oscillators, periods_of, trends, turning
+from robot_formation.koopman.predictors.oscillators import (
+    PriorKnowledge,
+    joined,
+    oscillators,
+    periods_of,
+    trends,
+    turning,
+)
 from robot_formation.koopman.predictors.parameters import EdmdParameters, PredictorParameters
 from robot_formation.koopman.predictors.spatial import rotated
 
@@ -40,13 +47,13 @@ _PRIORS = {
 }
 
 
-class Formation:
+class MixedExperts:
     """Experts of residual and leader-induced displacement, aggregated per axis; and the actuation bias."""
 
     def __init__(self, parameters: PredictorParameters, chosen: Sequence[str] = tuple(_PRIORS)) -> None:
         p = parameters.formation
         closing = self._closing = parameters.closing
-        known = Known(closing)
+        known = PriorKnowledge(closing)
         self._camera = known.camera
         self._bounds = np.array([parameters.max_u_m, parameters.max_v_m, parameters.max_turn_rad])
         self._periods = periods_of(p.oscillators)
@@ -101,7 +108,7 @@ class Formation:
 
     def _begin_with(self, displacement: Vector) -> None:
         """Forget what was known beforehand of the leader's step: this log has no residuals, and may be of anything."""
-        known = Known(self._closing)
+        known = PriorKnowledge(self._closing)
         known.step, known.step_sigma = displacement, np.sqrt(_EXACT)
         self.experts = _experts(self._parameters, known, self._chosen)
         self._estimate()
@@ -220,7 +227,7 @@ class Formation:
         self._estimate()
 
 
-def _experts(parameters: PredictorParameters, known: Known, chosen: Sequence[str]) -> dict[str, Expert]:
+def _experts(parameters: PredictorParameters, known: PriorKnowledge, chosen: Sequence[str]) -> dict[str, Expert]:
     """Make the experts by name; persistence comes first, since others take its filtered displacements."""
     closing, p = parameters.closing, parameters.formation
     levels = [

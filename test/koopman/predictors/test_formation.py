@@ -8,11 +8,11 @@ import numpy.typing as npt
 import pytest
 
 from cases import case
-from predictor_helpers import predictor, whole
+from predictor_helpers import predictor
 from robot_formation.koopman.predictors import Predictor, PredictorParameters
 from robot_formation.koopman.predictors.aggregation import ExponentialWeights, MlPoly
 from robot_formation.koopman.predictors.filter_bank import FilterBank, conditioned
-from robot_formation.koopman.predictors.oscillators import Known, oscillators, periods_of, trends, turning
+from robot_formation.koopman.predictors.oscillators import PriorKnowledge, oscillators, periods_of, trends, turning
 from robot_formation.koopman.predictors.parameters import ClosingParameters, OscillatorParameters
 
 Array = npt.NDArray[np.float64]
@@ -42,7 +42,7 @@ def test_an_oscillator_of_the_right_period_continues_its_sequence(harmonics: int
     w = 0.03 + 0.02 * np.cos(2.0 * math.pi * t / period + 0.4)
     if harmonics == 2:
         w += 0.01 * np.sin(4.0 * math.pi * t / period)
-    known = Known(ClosingParameters(step_v_m=float(w[0])))
+    known = PriorKnowledge(ClosingParameters(step_v_m=float(w[0])))
     bank = FilterBank(oscillators(known, 1, p, np.array([period]), harmonics), 0.95, 10)
     for value in w[:40]:
         bank.observe(np.array([0.0, value, 0.0]), np.zeros(3), EXACT)
@@ -51,7 +51,7 @@ def test_an_oscillator_of_the_right_period_continues_its_sequence(harmonics: int
 
 def test_a_turning_displacement_is_continued_after_two_timesteps() -> None:
     w = circle(20, -9.0)
-    known = Known(ClosingParameters(step_v_m=0.05))
+    known = PriorKnowledge(ClosingParameters(step_v_m=0.05))
     bank = FilterBank(turning(known, OscillatorParameters(), np.array([9.0, -9.0]), level=False), 0.95, 10)
     for value in w[:2]:
         bank.observe(value, np.zeros(3), EXACT)
@@ -65,14 +65,14 @@ def test_the_eigenvalues_of_oscillators_lie_on_the_unit_circle() -> None:
     periods = periods_of(p)
     assert (periods[0], periods[-1], len(periods)) == (pytest.approx(p.longest), pytest.approx(p.shortest), p.count)
     for model in (
-        oscillators(Known(ClosingParameters()), 0, p, periods, 2),
-        turning(Known(ClosingParameters()), p, periods, level=True),
+        oscillators(PriorKnowledge(ClosingParameters()), 0, p, periods, 2),
+        turning(PriorKnowledge(ClosingParameters()), p, periods, level=True),
     ):
         assert np.abs(np.linalg.eigvals(model.onward)) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_the_likelihood_finds_the_period() -> None:
-    p, known = OscillatorParameters(), Known(ClosingParameters(step_v_m=0.05))
+    p, known = OscillatorParameters(), PriorKnowledge(ClosingParameters(step_v_m=0.05))
     periods = periods_of(p)
     bank = FilterBank(oscillators(known, 1, p, periods, 1), p.discount, 10)
     rng = np.random.default_rng(1)
@@ -83,7 +83,7 @@ def test_the_likelihood_finds_the_period() -> None:
 
 
 def test_what_nobody_saw_leaves_the_weights_and_moves_the_mean_by_the_model() -> None:
-    p, known = OscillatorParameters(), Known(ClosingParameters())
+    p, known = OscillatorParameters(), PriorKnowledge(ClosingParameters())
     bank = FilterBank(trends(known, 1, [(0.0016, 0.0003, 0.002, 1.0, 0.002)]), 0.9, 10)
     for value in pulse(12, 14.0):
         bank.observe(value, np.zeros(3), known.camera)
