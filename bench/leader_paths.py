@@ -64,9 +64,9 @@ PATHS: dict[str, tuple[str, ...]] = {
     "lemniscate": ("lemniscate",),
     "lissajous": ("lissajous",),
     "stadium": ("stadium",),
-    "clothoid": ("clothoid",),
+    "clothoid": ("clothoid", "step_m=0.03"),
     "random_walk": ("random_walk",),
-    "switch": ("switch",),
+    "switch": ("switch", "step_m=0.03"),
 }
 """Paths by short name: the path's name, then its parameters."""
 WIDTH = "size_m=2.6"
@@ -405,7 +405,7 @@ def figure(args: argparse.Namespace) -> int:
                     places.append(row + 0.14 * (number_ - (len(MARKS) - 1) / 2))
                     values.append([100.0 * rank(r) / (TIMESTEPS - COLLECTION_TIMESTEPS) for r in found.values()])
             medians = [float(np.median(v)) for v in values]
-            spread = np.array([[m - np.quantile(v, 0.25), np.quantile(v, 0.75) - m] for m, v in zip(medians, values, strict=True)])
+            spread = np.array([np.abs(np.quantile(v, (0.25, 0.75)) - np.median(v)) for v in values])
             colour, marker = MARKS[name]
             handles[name] = panel.errorbar(
                 medians,
