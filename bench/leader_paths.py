@@ -66,7 +66,7 @@ PATHS: dict[str, tuple[str, ...]] = {
     "stadium": ("stadium",),
     "clothoid": ("clothoid", "step_m=0.03"),
     "random_walk": ("random_walk",),
-    "switch": ("switch", "step_m=0.03"),
+    "switch": ("switch",),
 }
 """Paths by short name: the path's name, then its parameters."""
 WIDTH = "size_m=2.6"

@@ -2,8 +2,8 @@
 
 The file's first line names the columns: `u_m` and `v_m`, and where they are known `residual_u_m`, `residual_v_m`,
 `commanded_u_m` and `commanded_v_m`, metres, u to the right and v forward. Other columns are ignored, and so are empty
-lines and lines that begin with '#'. Both cells of a residual or a command may be empty: it is unknown in that timestep. A column
-`turn_rad` holds the displacement's turn, anticlockwise.
+lines and lines that begin with '#'. Both cells of a residual or a command may be empty: it is unknown in that timestep.
+A column `turn_rad` holds the displacement's turn, anticlockwise.
 """
 
 from __future__ import annotations
