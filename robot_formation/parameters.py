@@ -48,6 +48,9 @@ class ParameterError(FormationError):
 FORMER_NAMES = {
     "formation.handicap": "formation.initial_loss",
     "precise.filter.calm_misfit": "precise.filter.calm_nis",
+    "precise.filter.neighbour_sidestep_sigma_m": "precise.filter.step.aside_sigma_m",
+    "precise.filter.neighbour_step_sigma_m": "precise.filter.step.length_sigma_m",
+    "precise.filter.neighbour_turn_sigma_rad": "precise.filter.step.turn_sigma_rad",
     "precise.filter.slip_per_lean": "precise.filter.slip_per_tilt",
 }
 """Names that parameters had before and today's: the value means the same, so that the former name is still taken."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robot_formation.alignment.precise.pose_filter import FilterParameters
+from robot_formation.alignment.precise.step_models import Drives
 from robot_formation.geometry.se2 import Motion, into_frame
 from robot_formation.parameters import parameter
 
@@ -73,6 +74,11 @@ class ActuationModel:
         self._covariance = np.diag([_SLIP_SIGMA**2, _BESIDE_SIGMA_M**2])
         self._wanted: Motion | None = None
         self._short: dict[tuple[str, bool], float] = {}
+
+    @property
+    def drives_so_far(self) -> Drives:
+        """What is known of own drives."""
+        return Drives(self.slip, self.overshoot, self.drives)
 
     @property
     def slip(self) -> float:
