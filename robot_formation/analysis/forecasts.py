@@ -56,9 +56,11 @@ def forecast_log(log: DisplacementLog, parameters: PredictorParameters) -> OneSt
     for t, place in enumerate(log.places):
         if t > 0:
             forecast = predictor.predict()
-            means[t], covariances[t] = forecast.mean, forecast.covariance
+            means[t], covariances[t] = forecast.mean[:2], forecast.covariance[:2, :2]
         try:
-            predictor.observe(log.displacements_m[t], _known(log.residuals_m[t]), _known(log.commanded_m[t]))
+            predictor.observe(
+                np.append(log.displacements_m[t], 0.0), _known(log.residuals_m[t]), _known(log.commanded_m[t])
+            )
         except PredictionError as error:
             raise AnalysisError(
                 f"{log.source}, {place}: {error}; correct it (metres), or raise predictor.max_u_m and max_v_m"
@@ -125,7 +127,7 @@ def _rows(values: NDArray[np.float64]) -> list[object]:
 
 
 def _known(uv_m: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    return uv_m if np.isfinite(uv_m).all() else None
+    return np.append(uv_m, 0.0) if np.isfinite(uv_m).all() else None
 
 
 def _line(name: str, cells: Sequence[str], width: int) -> str:

@@ -30,7 +30,7 @@ class PredictorComponent(Component):
         state_file = parameters.state_file.replace("{robot}", place.robot)
         self._state_file = Path(state_file) if state_file else None
         self._predictor = self._restored(parameters)
-        # By stamp, then topic: (u, v) [m], None where there is no estimate.
+        # By stamp, then topic: (u, v) [m] with a turn of 0, None where there is no estimate.
         self._parts: dict[int, dict[names.Topic, Message]] = {}
         self._first_commanded_ns: int | None = None
 
@@ -94,7 +94,7 @@ class PredictorComponent(Component):
         if not self._predictor.observations:
             return (0.0, 0.0)
         forecast = self._predictor.predict()
-        u_m, v_m = (forecast.mean - forecast.command).tolist()
+        u_m, v_m, _ = (forecast.mean - forecast.command).tolist()
         return (u_m, v_m)
 
     def _on_part(self, topic: names.Topic, message: Message) -> None:
@@ -109,13 +109,13 @@ class PredictorComponent(Component):
         self._answer(stamp_ns)
 
     def _read(self, topic: names.Topic, message: Message) -> Any:
-        """Read (u, v) [m] of a displacement, None where there is no estimate."""
+        """Read (u, v, 0) of a displacement [m], None where there is no estimate."""
         if not conversions.has_estimate(message):
             if topic == names.DISPLACEMENT:
                 self.warn("a displacement without an estimate is left out")
             return None
         motion = conversions.read_displacement(message)
-        found = np.array([motion.u_m, motion.v_m])
+        found = np.array([motion.u_m, motion.v_m, 0.0])
         if not np.isfinite(found).all():
             self.warn(f"{topic.name}: ({motion.u_m}, {motion.v_m}) m is not finite; it is left out")
             return None
@@ -148,9 +148,9 @@ class PredictorComponent(Component):
             self.warn(f"{error}; answering with no motion")
             self._send_prediction(Motion(), conversions.NO_ESTIMATE)
             return
-        covariance = _TO_XY @ forecast.about_command @ _TO_XY.T
+        covariance = _TO_XY @ forecast.about_command[:2, :2] @ _TO_XY.T
         self._save()  # before the answer: whoever has it finds the state that goes with it
-        u_m, v_m = forecast.command.tolist()
+        u_m, v_m, _ = forecast.command.tolist()
         self._send_prediction(Motion.from_uv(u_m, v_m), covariance.ravel().tolist())
 
     def _send_prediction(self, mean: Motion, covariance: Sequence[float]) -> None:

@@ -24,8 +24,8 @@ def forecasts(name: str, history: Sequence[Array | tuple[float, float]] | Array,
     found = predictor(name, **values)
     means = []
     for x in history:
-        found.observe(np.array(x))
-        means.append(found.predict().mean)
+        found.observe(np.append(x, 0.0))
+        means.append(found.predict().mean[:2])
     return np.array(means)
 
 

@@ -40,9 +40,19 @@ class Mixture:
             model.observe(x)
         self._begun = True
 
+    def advance(self) -> None:
+        """See `Model`."""
+        for model in self._models.values():
+            model.advance()
+
     def forecast(self) -> Vector:
         """See `Model`."""
         return np.asarray((self._weights() * self._forecasts()).sum(axis=0))
+
+    def ahead(self, steps: int) -> Matrix:
+        """See `Model`."""
+        found = np.stack([model.ahead(steps) for model in self._models.values()])
+        return np.asarray((self._weights()[:, None] * found).sum(axis=0))
 
     def diagnostics(self) -> Diagnostics:
         """See `Model`: that of the Koopman model, and how much it counts."""

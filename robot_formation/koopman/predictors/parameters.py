@@ -90,6 +90,17 @@ class ClosingParameters:
     )
     step_sigma_u_m: float = parameter(0.003, "Standard deviation of it along u", unit="m", low=1e-6, high=1.0)
     step_sigma_v_m: float = parameter(0.0025, "Standard deviation of it along v", unit="m", low=1e-6, high=1.0)
+    residual_turn_rad: float = parameter(
+        0.012, "Standard deviation of the camera's residual turn", unit="rad", low=1e-6, high=3.2
+    )
+    start_turn_rad: float = parameter(
+        0.02, "Standard deviation of the residual turn before timestep 1", unit="rad", low=1e-6, high=3.2
+    )
+    step_turn_rad: float = parameter(0.0, "Leader-induced turn known beforehand", unit="rad", low=-3.2, high=3.2)
+    step_sigma_turn_rad: float = parameter(0.006, "Standard deviation of it", unit="rad", low=1e-6, high=3.2)
+    rad_per_m: float = parameter(
+        3.0, "Turns are filtered with the lengths below times this", unit="rad/m", low=1e-6, high=1000.0
+    )
     noise_m: tuple[float, ...] = parameter(
         (0.0016, 0.0025, 0.005),
         "Filters: standard deviation of the leader-induced displacement about its level",
@@ -163,6 +174,10 @@ class PredictorParameters:
     )
     sigma_v_m: float = parameter(
         0.0025, "Standard deviation of a forecast along v before errors tell", unit="m", low=0.0, high=1.0
+    )
+    max_turn_rad: float = parameter(0.35, "Bound of the forecast turn", unit="rad", low=0.0, high=3.2)
+    sigma_turn_rad: float = parameter(
+        0.01, "Standard deviation of a forecast turn before errors tell", unit="rad", low=0.0, high=3.2
     )
     sigma_weight: float = parameter(2.0, "How many forecasts these standard deviations count for", low=0.01, high=1e6)
     sigma_discount: float = parameter(
