@@ -215,6 +215,40 @@ def from_mapping(cls: type[T], values: Mapping[str, object], *, where: str) -> T
     return _build(cls, {name: check(known[name], value, where=where) for name, value in flat.items()})
 
 
+def read_texts(cls: type, texts: Iterable[str], *, where: str, example: str) -> dict[str, Any]:
+    """Read texts like 'size_m=2.0', in which a ROS parameter can hold parameters of a dataclass.
+
+    Args:
+        cls: a frozen dataclass as for `from_mapping`, which checks names, types and ranges.
+        texts: a name and a value each.
+        where: what the parameters belong to, for messages ("surface 'bowl'").
+        example: of such a text, for messages.
+
+    Raises:
+        ParameterError: on a text that is no name and value, a name that comes twice, or a value that is no number where
+            one is needed.
+    """
+    known = specs(cls)
+    values: dict[str, Any] = {}
+    for text in texts:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise ParameterError(f"{where}: its parameters are texts like '{example}', not {shown(text)}")
+        if key in values:
+            raise ParameterError(f"{where}: '{key}' is given twice; keep one of them")
+        kind = known[key].type if key in known else str  # an unknown name is refused as such
+        values[key] = value if kind is str else _number_of(value, kind, f"{where}: '{key}'")
+    return values
+
+
+def _number_of(text: str, kind: object, subject: str) -> object:
+    try:
+        return int(text) if kind is int else float(text)
+    except ValueError:
+        what = "a whole number" if kind is int else "a number"
+        raise ParameterError(f"{subject} needs {what}, not {shown(text)}") from None
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return a text with the known name that was probably meant, whatever its case, or list what there is."""
     candidates = list(known)

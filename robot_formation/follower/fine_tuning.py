@@ -57,14 +57,14 @@ class FineTunerParameters:
 
     mode: AlignmentModeName = parameter(AlignmentModeName.PRECISE, "How the camera's blocks are used")
     first_step_m: float = parameter(
-        0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
+        0.05,
+        "Displacement of timestep 1 along v, known beforehand: a scenario takes it from the leader's path",
+        unit="m",
+        low=-0.2,
+        high=0.2,
     )
-    first_step_u_m: float = parameter(
-        0.0, "The same along u, to the right: not 0 where the leader's path turns or leads aside", unit="m", low=-0.1, high=0.1
-    )
-    first_turn_rad: float = parameter(
-        0.0, "Turn of timestep 1, anticlockwise: the leader's own turn, known beforehand", unit="rad", low=-1.0, high=1.0
-    )
+    first_step_u_m: float = parameter(0.0, "The same along u", unit="m", low=-0.1, high=0.1)
+    first_turn_rad: float = parameter(0.0, "Turn of timestep 1, known beforehand too", unit="rad", low=-1.1, high=1.1)
     formation_distance_m: float = parameter(
         FORMATION_DISTANCE_M,
         "Distance beside the neighbour that is kept, between the origins of base_link, along u",
@@ -75,7 +75,7 @@ class FineTunerParameters:
     # The bodies are 8 cm apart in a formation of 32 cm: a wild forecast must not push the neighbour.
     max_v_m: float = parameter(0.1, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2)
     max_u_m: float = parameter(
-        0.05, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
+        0.075, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
     )
     max_turn_rad: float = parameter(
         0.35, "Largest turn of the prediction move; larger ones are cut", unit="rad", low=0.0, high=1.0
@@ -308,7 +308,7 @@ class FineTuner:
     @property
     def _first_step(self) -> Motion:
         p = self._p
-        return Motion(p.first_step_m, -p.first_step_u_m if p.first_step_u_m else 0.0, p.first_turn_rad)
+        return Motion(p.first_step_m, 0.0 - p.first_step_u_m, p.first_turn_rad)
 
     @property
     def _blind(self) -> bool:
