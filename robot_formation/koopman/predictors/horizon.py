@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.models import Matrix, Vector, array
-from robot_formation.koopman.predictors.spatial import after, rotated, ways
+from robot_formation.koopman.predictors.spatial import after, between, ways
 
 MOST_STEPS = 10
 """Timesteps ahead whose errors are observed; farther ones are scaled up from these."""
@@ -59,7 +59,7 @@ class HorizonErrors:
         before, self._residual = self._residual, residual
         if residual is None:
             return
-        w = None if before is None else _from(before, after(total, residual))
+        w = None if before is None else between(before, after(total, residual))
         for number, (steps, way, driven) in enumerate(self._pending):
             self._count(self._ways, 0, number, after(driven, residual) - way[number])
             if number and w is not None:
@@ -101,8 +101,3 @@ class HorizonErrors:
         pending = [(array(steps, MOST_STEPS, 3), array(driven, 3)) for steps, driven in state["pending"]]
         self._pending = [(steps, ways(steps), driven) for steps, driven in pending[:MOST_STEPS]]
         self._residual = None if state["residual"] is None else array(state["residual"], 3)
-
-
-def _from(before: Vector, now: Vector) -> Vector:
-    """Return the motion (3,) that leads from one pose to another."""
-    return np.append(rotated(now[:2] - before[:2], -float(before[2])), now[2] - before[2])
