@@ -25,7 +25,11 @@ KNOWN_STEP: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
             "first_step_u_m": ("u", 0.1),
             "first_turn_rad": ("turn", 1.1),
         },
-        "predictor": {"closing.step_v_m": ("v", 1.0), "closing.step_u_m": ("u", 1.0)},
+        "predictor": {
+            "closing.step_v_m": ("v", 1.0),
+            "closing.step_u_m": ("u", 1.0),
+            "closing.step_turn_rad": ("turn", 3.2),
+        },
     }
 )
 """Parameters that say a follower's first step, by node: its component and the largest value."""

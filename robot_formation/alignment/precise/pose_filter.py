@@ -134,13 +134,15 @@ class FilterParameters:
 class PoseFilter:
     """Where the neighbour stands, as far as looks and moves tell."""
 
-    def __init__(self, model: MarkerModel, edges: EdgeParameters, parameters: FilterParameters) -> None:
+    def __init__(
+        self, model: MarkerModel, edges: EdgeParameters, parameters: FilterParameters, least_leg_m: float = 0.0
+    ) -> None:
         self._model = model
         self._edges = edges
         self._looks = LookUpdate(model, edges)
         self._p = parameters
         self.hypotheses: list[Hypothesis] = []
-        self._models = StepModels(parameters.step)
+        self._models = StepModels(parameters.step, least_leg_m)
         self._nis = 0.0
         self._stepped = False
 

@@ -100,7 +100,9 @@ class PreciseAlignment:
 
     def __init__(self, parameters: PreciseParameters, formation_distance_m: float) -> None:
         self._p = parameters
-        self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
+        self._filter = PoseFilter(
+            MarkerModel(parameters.geometry), parameters.edges, parameters.filter, parameters.actuation.least_leg_m
+        )
         self._planner = MotionPlanner(parameters.approach)
         self._actuation = ActuationModel(parameters.actuation, parameters.filter.move_floor_m)
         self._search = NeighbourSearch(parameters.search)

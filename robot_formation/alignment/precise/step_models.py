@@ -9,7 +9,7 @@ several step models are kept side by side; each look tells how likely each of th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,12 +21,15 @@ from robot_formation.parameters import parameter
 
 Matrix = NDArray[np.float64]
 
+# All chosen.
 _FIRST_SIDESTEP_SIGMA_M = 0.002
 """Standard deviation of the neighbour's way aside in its first step, before the follower knows its own slip."""
 _DISCOUNT = 0.85
 """Weight of a look's likelihoods after one more: some seven looks count."""
+_TURN_SCALE = 0.3
+"""Bound on the factor by which the standard deviation of a forecast turn counts."""
 _MOST_COST = 9.0
-"""Bound on what a look charges a model more than the best one, and on how far a model falls behind."""
+"""Bound on what a look charges a model more than the best one."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +53,23 @@ class StepParameters:
         0.001, "Error of a forecast step aside, least", unit="m", low=0.0, high=1.0
     )
     scales: tuple[float, ...] = parameter(
-        (0.0, 0.3, 1.0, 2.0), "Step models by forecast: factors by which its standard deviations count", low=0.0, high=100.0
+        (0.3, 1.0),
+        "Step models by forecast: factors by which the forecast's standard deviations count",
+        low=0.0,
+        high=100.0,
     )
-    straight_cost: float = parameter(0.0, "-2 log likelihood of a step straight ahead beforehand", low=-100.0, high=100.0)
-    forecast_cost: float = parameter(4.0, "-2 log likelihood of a step by forecast beforehand", low=-100.0, high=100.0)
+    forecast_cost: float = parameter(
+        3.0, "-2 log likelihood of a step by forecast beforehand; of a step ahead: 0", low=0.0, high=100.0
+    )
+    change_cost: float = parameter(
+        6.0, "-2 log likelihood of a step that nothing foretells, beforehand", low=0.0, high=100.0
+    )
+    change_sigma_m: float = parameter(
+        0.03, "Way of such a step beside the forecast, standard deviation", unit="m", low=0.0, high=1.0
+    )
+    change_sigma_rad: float = parameter(
+        0.1, "Turn of such a step beside the forecast, standard deviation", unit="rad", low=0.0, high=1.0
+    )
 
 
 @dataclass(frozen=True)
@@ -75,18 +91,27 @@ class StepModel:
 
 
 class StepModels:
-    """Keeps the models' likelihoods.
+    """Keeps the models' likelihoods."""
 
-    Attributes:
-        costs: -2 log likelihood of each model, the likeliest 0.
-    """
+    def __init__(self, parameters: StepParameters, least_leg_m: float) -> None:
+        """Begin without a look.
 
-    def __init__(self, parameters: StepParameters) -> None:
-        self._p = parameters
-        self.costs = [parameters.straight_cost, *(parameters.forecast_cost for _ in parameters.scales)]
+        Args:
+            parameters: of the models.
+            least_leg_m: leg aside up to which a drive doesn't turn its wheels; the neighbour's is as the follower's.
+        """
+        self._p = p = parameters
+        self._least_leg_m = least_leg_m
+        self._before = [0.0, *(p.forecast_cost for _ in p.scales), p.change_cost]
+        self._seen = [0.0] * len(self._before)
+
+    @property
+    def costs(self) -> list[float]:
+        """-2 log likelihood of each model."""
+        return [before + seen for before, seen in zip(self._before, self._seen, strict=True)]
 
     def models(self, step: UncertainMotion, own: Drives, inflation: float, first: bool) -> list[StepModel]:
-        """List the models of a step: straight ahead, and by forecast with several covariances.
+        """List the models of a step: ahead on an arc, by forecast with several covariances, and a change.
 
         Args:
             step: the forecast in the neighbour's frame.
@@ -96,27 +121,41 @@ class StepModels:
         """
         p, mean = self._p, step.mean
         aside_m = _FIRST_SIDESTEP_SIGMA_M if own.count == 0 else p.aside_sigma_m * inflation
-        ahead = Motion(mean.x_m, mean.x_m * math.tan(0.5 * mean.yaw_rad) + own.slip * mean.x_m, mean.yaw_rad)
-        least = np.diag([p.length_sigma_m**2, aside_m**2, p.turn_sigma_rad**2])
+        least = _diagonal(p.length_sigma_m, aside_m, p.turn_sigma_rad)
         if first:
-            known = Motion(mean.x_m, mean.y_m + own.slip * mean.x_m, mean.yaw_rad)
-            return [StepModel(known, least, False)]
-        found = [StepModel(ahead, least, False)]
-        floor = np.diag([p.length_sigma_m**2, max(aside_m, p.forecast_aside_sigma_m) ** 2, p.turn_sigma_rad**2])
-        found += [StepModel(mean, floor + scale**2 * step.matrix, True) for scale in p.scales]
-        return found
+            return [StepModel(self._driven(mean, own), least, False)]
+        arc = Motion(mean.x_m, mean.x_m * math.tan(0.5 * mean.yaw_rad), mean.yaw_rad)
+        floor = _diagonal(p.length_sigma_m, max(aside_m, p.forecast_aside_sigma_m), p.turn_sigma_rad)
+        return [
+            StepModel(self._driven(arc, own), least, False),
+            *(StepModel(mean, floor + _scaled(step.matrix, scale), True) for scale in p.scales),
+            StepModel(mean, step.matrix + _diagonal(p.change_sigma_m, p.change_sigma_m, p.change_sigma_rad), True),
+        ]
+
+    def _driven(self, step: Motion, own: Drives) -> Motion:
+        """Return what a drive makes of a step: it slips aside, and short legs aside are not driven."""
+        turn, forward, left = step.legs
+        if abs(left) < self._least_leg_m:
+            step = Motion.from_legs(turn, forward, 0.0)
+        return Motion(step.x_m, step.y_m + own.slip * step.x_m, step.yaw_rad)
 
     def judge(self, costs: Iterable[tuple[int, float]]) -> None:
-        """Process a look: the -2 log likelihoods of the hypotheses by model number, the model's own included."""
-        least = [math.inf] * len(self.costs)
+        """Process a look: -2 log likelihoods of the hypotheses with their models' numbers, the model's own included."""
+        own, least = self.costs, [math.inf] * len(self._before)
         for number, cost in costs:
-            least[number] = min(least[number], cost - self.costs[number])
+            least[number] = min(least[number], cost - own[number])
+        if not all(map(math.isfinite, least)):
+            return  # one model for all, or none
         best = min(least)
-        if all(map(math.isfinite, least)):
-            self.costs = _behind(
-                [_DISCOUNT * old + min(new - best, _MOST_COST) for old, new in zip(self.costs, least, strict=True)]
-            )
+        seen = [_DISCOUNT * old + min(new - best, _MOST_COST) for old, new in zip(self._seen, least, strict=True)]
+        self._seen = [value - min(seen) for value in seen]
 
 
-def _behind(costs: Sequence[float]) -> list[float]:
-    return [min(cost - min(costs), _MOST_COST) for cost in costs]
+def _scaled(covariance: Matrix, scale: float) -> Matrix:
+    """Scale a forecast's standard deviations; that of the turn is mostly the error of the follower's own heading."""
+    factors = np.array([scale, scale, min(scale, _TURN_SCALE)])
+    return factors[:, None] * covariance * factors
+
+
+def _diagonal(x_m: float, y_m: float, yaw_rad: float) -> Matrix:
+    return np.diag([x_m**2, y_m**2, yaw_rad**2])
