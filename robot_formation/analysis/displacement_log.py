@@ -204,4 +204,6 @@ def _number(where: str, name: str, text: str) -> float:
         raise AnalysisError(
             f"{where}: {name} is {text[:_SHOWN]!r}, which is not finite; correct it or leave the row out"
         )
-    raise AnalysisError(f"{where}: {name} is {text[:_SHOWN]!r}, which is no number; write metres, or radians of a turn, like 0.05")
+    raise AnalysisError(
+        f"{where}: {name} is {text[:_SHOWN]!r}, which is no number; write metres, or radians of a turn, like 0.05"
+    )

@@ -45,11 +45,11 @@ def draw_forecasts(log: DisplacementLog, forecasts: Sequence[OneStepForecasts], 
     for column, (forecast, colour) in enumerate(zip(forecasts, _COLOURS, strict=False)):
         panels[0, column].set_title(forecast.name, fontsize=11)
         for row in range(2):
-            _panel(panels[row, column], log.targets_m[:, row], forecast, row, colour)
+            _panel(panels[row, column], log.targets[:, row], forecast, row, colour)
         panels[1, column].set_xlabel("timestep")
     for row, name in enumerate(_AXES):
         panels[row, 0].set_ylabel(f"{name}, cm")
-        _limit(panels[row, 0], log.targets_m[:, row], forecasts, row)
+        _limit(panels[row, 0], log.targets[:, row], forecasts, row)
     _legend(figure, "ideal move" if log.has_residuals else "displacement")
     figure.suptitle(f"{Path(log.source).name}: one-step forecasts", fontsize=12)
     return save_figure(figure, path)

@@ -58,14 +58,12 @@ def forecast_log(log: DisplacementLog, parameters: PredictorParameters) -> OneSt
             forecast = predictor.predict()
             means[t], covariances[t] = forecast.mean[:2], forecast.covariance[:2, :2]
         try:
-            predictor.observe(
-                np.append(log.displacements_m[t], 0.0), _known(log.residuals_m[t]), _known(log.commanded_m[t])
-            )
+            predictor.observe(log.displacements[t], _known(log.residuals[t]), _known(log.commanded[t]))
         except PredictionError as error:
             raise AnalysisError(
                 f"{log.source}, {place}: {error}; correct it (metres), or raise predictor.max_u_m and max_v_m"
             ) from error
-    statistics = error_statistics(log.targets_m - means, covariances)
+    statistics = error_statistics(log.targets[:, :2] - means, covariances)
     return OneStepForecasts(parameters.name, means, covariances, statistics)
 
 
@@ -126,8 +124,8 @@ def _rows(values: NDArray[np.float64]) -> list[object]:
     return [None if np.isnan(row).any() else row.tolist() for row in values]
 
 
-def _known(uv_m: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    return np.append(uv_m, 0.0) if np.isfinite(uv_m).all() else None
+def _known(found: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    return found if np.isfinite(found[:2]).all() else None
 
 
 def _line(name: str, cells: Sequence[str], width: int) -> str:

@@ -175,7 +175,7 @@ def _default_picture(args: argparse.Namespace) -> Path:
 def _warn_of_bounds(log: DisplacementLog, parameters: PredictorParameters) -> None:
     """Warn if forecasts are cut to bounds that the log itself goes beyond."""
     for axis, bound_m in enumerate((parameters.max_u_m, parameters.max_v_m)):
-        beyond = int((abs(log.displacements_m[:, axis]) > bound_m).sum())
+        beyond = int((abs(log.displacements[:, axis]) > bound_m).sum())
         if beyond:
             name = f"predictor.max_{'uv'[axis]}_m"
             print(

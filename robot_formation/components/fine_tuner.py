@@ -125,5 +125,7 @@ class FineTunerComponent(Component):
             (names.DISPLACEMENT, UncertainMotion(report.displacement)),
             (names.RESIDUAL, report.residual),
         ):
-            mean, covariance = (Motion(), conversions.NO_ESTIMATE) if motion is None else (motion.mean, motion.covariance)
+            mean, covariance = (
+                (Motion(), conversions.NO_ESTIMATE) if motion is None else (motion.mean, motion.covariance)
+            )
             self._send(topic, conversions.displacement(mean, self._base, self.stamp_ns, covariance))

@@ -118,7 +118,9 @@ class PredictorComponent(Component):
             return None
         motion = conversions.read_displacement(message)
         if not motion.finite:
-            self.warn(f"{topic.name}: ({motion.u_m}, {motion.v_m}) m, {motion.yaw_rad} rad is not finite; it is left out")
+            self.warn(
+                f"{topic.name}: ({motion.u_m}, {motion.v_m}) m, {motion.yaw_rad} rad is not finite; it is left out"
+            )
             return None
         unknown = topic == names.RESIDUAL and not conversions.knows_turn(message)
         return np.array([motion.u_m, motion.v_m, math.nan if unknown else motion.yaw_rad])

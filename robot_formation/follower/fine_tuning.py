@@ -81,7 +81,7 @@ class FineTunerParameters:
         0.35, "Largest turn of the prediction move; larger ones are cut", unit="rad", low=0.0, high=1.0
     )
     blackouts: tuple[int, ...] = parameter(
-        (), "Timesteps without the camera: pairs of first timestep and length, one after another", low=0, high=1000000
+        (), "Timesteps without the camera: pairs of first timestep and length, one after another", low=1, high=1000000
     )
     calibration_file: str = parameter(
         "", "YAML file of 'formation calibrate vision': its values go before those of 'alignment'; empty: none"
@@ -301,7 +301,9 @@ class FineTuner:
         if cut:
             text = f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"
             if abs(turn) > self._p.max_turn_rad:
-                text = f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m with a turn of {turn:.3f} rad is too long: cut"
+                text = (
+                    f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m with a turn of {turn:.3f} rad is too long: cut"
+                )
             actions.insert(0, Warn(text))
         return actions
 

@@ -280,7 +280,9 @@ class PoseFilter:
         for hypothesis in self.hypotheses:
             self._looks.update(hypothesis, seen)
         if branched:
-            self._models.judge([(hypothesis.model, hypothesis.cost) for hypothesis in self.hypotheses if hypothesis.sane])
+            self._models.judge(
+                [(hypothesis.model, hypothesis.cost) for hypothesis in self.hypotheses if hypothesis.sane]
+            )
         self._prune()
 
     def plausible(self, blocks: Sequence[Block]) -> list[Block]:
