@@ -22,6 +22,8 @@ from robot_formation.parameters import Choice, ParameterError, parameter
 from robot_formation.vision.pixy2.block import Block
 
 COLLECTION_TIMESTEPS = 3
+_UNTOLD = (0.01**2, 0.0, 0.0, 0.0, 0.01**2, 0.0, 0.0, 0.0, 0.02**2)
+"""Covariance of the neighbour's step about a command, which has the actuation bias in it: (x, y, yaw) in m and rad."""
 
 
 class AlignmentModeName(Choice):
@@ -262,7 +264,7 @@ class FineTuner:
     def _step_of(self, command: Motion) -> UncertainMotion:
         """Take a command for the motion to the next formation position, from what is left to the present one."""
         left = self._alignment.ahead() if self._blind else self._alignment.offset()
-        return UncertainMotion((left.mean if left else Motion()).inverse().then(command))
+        return UncertainMotion((left.mean if left else Motion()).inverse().then(command), _UNTOLD)
 
     def _begin(self) -> list[Action]:
         if self._neighbour < self.timestep:

@@ -100,10 +100,10 @@ def test_a_forecast_is_that_of_a_predictor_that_saw_the_rows_before(
     for t in range(12):
         if t:
             expected = predictor.predict()
-            assert found["forecast"][t] == expected.mean.tolist()
-            assert found["covariance"][t] == expected.covariance.tolist()
-        predictor.observe(rows.displacements_m[t], rows.residuals_m[t])
-    errors = rows.targets_m[1:] - np.array(found["forecast"][1:])
+            assert found["forecast"][t] == expected.mean[:2].tolist()
+            assert found["covariance"][t] == expected.covariance[:2, :2].tolist()
+        predictor.observe(rows.displacements[t], rows.residuals[t])
+    errors = rows.targets[1:, :2] - np.array(found["forecast"][1:])
     assert found["error_m"]["rmse"] == pytest.approx(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
 
 
@@ -243,9 +243,9 @@ def test_a_log_or_a_bag_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_bags_log_has_its_displacements_residuals_and_commands(tmp_path: Path) -> None:
     log = load_displacements(write_bag(tmp_path / "bag", unseen=[2]), "follower_1")
-    np.testing.assert_array_equal(log.displacements_m, [step.moved for step in STEPS])
-    np.testing.assert_array_equal(log.residuals_m, [step.residual for step in STEPS])
-    np.testing.assert_array_equal(log.commanded_m, [*COMMANDED[:2], (np.nan, np.nan), COMMANDED[3]])
+    np.testing.assert_array_equal(log.displacements[:, :2], [step.moved for step in STEPS])
+    np.testing.assert_array_equal(log.residuals[:, :2], [step.residual for step in STEPS])
+    np.testing.assert_array_equal(log.commanded[:, :2], [*COMMANDED[:2], (np.nan, np.nan), COMMANDED[3]])
     assert log.places[0] == "timestep 1"
 
 

@@ -93,7 +93,7 @@ class FilterParameters:
     skew_sigma_per_m: float = parameter(0.02, "Mixed part of the ground's curvature", unit="1/m", low=1e-4, high=10.0)
     move_sigma: float = parameter(0.02, "Error of a measured move, share of its length", low=0.0, high=1.0)
     move_floor_m: float = parameter(0.0007, "Error of a measured move, least", unit="m", low=0.0, high=0.1)
-    turn_sigma: float = parameter(0.06, "Error of a measured turn, share of it", low=0.0, high=1.0)
+    turn_sigma: float = parameter(0.02, "Error of a measured turn, share of it", low=0.0, high=1.0)
     yaw_drift_rad: float = parameter(
         0.0022,
         "Turn by slip on a move of 10 cm, which the wheels don't measure; grows with the root of the way",
@@ -135,14 +135,19 @@ class PoseFilter:
     """Where the neighbour stands, as far as looks and moves tell."""
 
     def __init__(
-        self, model: MarkerModel, edges: EdgeParameters, parameters: FilterParameters, least_leg_m: float = 0.0
+        self,
+        model: MarkerModel,
+        edges: EdgeParameters,
+        parameters: FilterParameters,
+        least_leg_m: float = 0.0,
+        wheel_lever_m: float = 0.0,
     ) -> None:
         self._model = model
         self._edges = edges
         self._looks = LookUpdate(model, edges)
         self._p = parameters
         self.hypotheses: list[Hypothesis] = []
-        self._models = StepModels(parameters.step, least_leg_m)
+        self._models = StepModels(parameters.step, least_leg_m, wheel_lever_m)
         self._nis = 0.0
         self._stepped = False
 
@@ -249,7 +254,7 @@ class PoseFilter:
         along = np.array([[c, -s], [s, c]])
         # The neighbour slips as the follower does, and by as much more as it is tilted more.
         tilt = float(relative_tilt(state[None])[0][0]) - (tilt_rad if model.slip_included else 0.0)
-        aside = step.y_m - slip * tilt * abs(step.x_m)
+        aside = step.y_m - slip * tilt * (abs(step.x_m) + self._models.turning_way_m(step))
         jacobian = np.eye(SIZE)
         jacobian[:2, YAW] = along @ (-aside, step.x_m)
         state[:2] += along @ (step.x_m, aside)

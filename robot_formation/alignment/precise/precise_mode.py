@@ -100,8 +100,13 @@ class PreciseAlignment:
 
     def __init__(self, parameters: PreciseParameters, formation_distance_m: float) -> None:
         self._p = parameters
+        drive = parameters.actuation
         self._filter = PoseFilter(
-            MarkerModel(parameters.geometry), parameters.edges, parameters.filter, parameters.actuation.least_leg_m
+            MarkerModel(parameters.geometry),
+            parameters.edges,
+            parameters.filter,
+            drive.least_leg_m,
+            drive.wheel_lever_m,
         )
         self._planner = MotionPlanner(parameters.approach)
         self._actuation = ActuationModel(parameters.actuation, parameters.filter.move_floor_m)

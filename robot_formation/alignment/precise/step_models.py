@@ -28,6 +28,10 @@ _DISCOUNT = 0.85
 """Weight of a look's likelihoods after one more: some seven looks count."""
 _TURN_SCALE = 0.3
 """Bound on the factor by which the standard deviation of a forecast turn counts."""
+_FIRST_ASIDE_SHARE = 0.5
+"""Error of the first step's way aside, share of what its turn leads aside: nothing has been seen of its slip yet."""
+_TURNING_RAD, _SURE_ASIDE_M = 0.03, 0.008
+"""Turn from which on the way aside of a step ahead is the forecast's, and the most that this may be unsure."""
 _MOST_COST = 9.0
 """Bound on what a look charges a model more than the best one."""
 
@@ -48,6 +52,10 @@ class StepParameters:
     )
     turn_sigma_rad: float = parameter(
         0.003, "Error of the forecast turn, least: the neighbour also turns by slip", unit="rad", low=0.0, high=1.0
+    )
+    turn_share: float = parameter(0.07, "Error of the neighbour's turn, share of it", low=0.0, high=1.0)
+    aside_share: float = parameter(
+        0.15, "Error of its way aside, share of what its turn leads aside", low=0.0, high=10.0
     )
     forecast_aside_sigma_m: float = parameter(
         0.001, "Error of a forecast step aside, least", unit="m", low=0.0, high=1.0
@@ -93,15 +101,17 @@ class StepModel:
 class StepModels:
     """Keeps the models' likelihoods."""
 
-    def __init__(self, parameters: StepParameters, least_leg_m: float) -> None:
+    def __init__(self, parameters: StepParameters, least_leg_m: float, wheel_lever_m: float) -> None:
         """Begin without a look.
 
         Args:
             parameters: of the models.
             least_leg_m: leg aside up to which a drive doesn't turn its wheels; the neighbour's is as the follower's.
+            wheel_lever_m: way of the wheels per radian of a turn; robots slip on it too.
         """
         self._p = p = parameters
         self._least_leg_m = least_leg_m
+        self._wheel_lever_m = wheel_lever_m
         self._before = [0.0, *(p.forecast_cost for _ in p.scales), p.change_cost]
         self._seen = [0.0] * len(self._before)
 
@@ -121,13 +131,17 @@ class StepModels:
         """
         p, mean = self._p, step.mean
         aside_m = _FIRST_SIDESTEP_SIGMA_M if own.count == 0 else p.aside_sigma_m * inflation
-        least = _diagonal(p.length_sigma_m, aside_m, p.turn_sigma_rad)
+        turned = self._turned(mean)
+        least = turned + _diagonal(p.length_sigma_m, aside_m, p.turn_sigma_rad)
         if first:
-            return [StepModel(self._driven(mean, own), least, False)]
+            unsure = _diagonal(0.0, _FIRST_ASIDE_SHARE * mean.x_m * mean.yaw_rad, 0.0)
+            return [StepModel(self._driven(mean, own), least + unsure, False)]
         arc = Motion(mean.x_m, mean.x_m * math.tan(0.5 * mean.yaw_rad), mean.yaw_rad)
-        floor = _diagonal(p.length_sigma_m, max(aside_m, p.forecast_aside_sigma_m), p.turn_sigma_rad)
+        # In turns the way aside has many parts: the predictor has seen their sum, where it is sure of it.
+        turning = abs(mean.yaw_rad) > _TURNING_RAD and step.matrix[1, 1] < _SURE_ASIDE_M**2
+        floor = turned + _diagonal(p.length_sigma_m, max(aside_m, p.forecast_aside_sigma_m), p.turn_sigma_rad)
         return [
-            StepModel(self._driven(arc, own), least, False),
+            StepModel(mean if turning else self._driven(arc, own), least, turning),
             *(StepModel(mean, floor + _scaled(step.matrix, scale), True) for scale in p.scales),
             StepModel(mean, step.matrix + _diagonal(p.change_sigma_m, p.change_sigma_m, p.change_sigma_rad), True),
         ]
@@ -137,7 +151,18 @@ class StepModels:
         turn, forward, left = step.legs
         if abs(left) < self._least_leg_m:
             step = Motion.from_legs(turn, forward, 0.0)
-        return Motion(step.x_m, step.y_m + own.slip * step.x_m, step.yaw_rad)
+        way_m = step.x_m + math.copysign(self.turning_way_m(step), step.x_m)
+        return Motion(step.x_m, step.y_m + own.slip * way_m, step.yaw_rad)
+
+    def turning_way_m(self, step: Motion) -> float:
+        """Return the way [m] that the wheels make for a step's turn."""
+        return self._wheel_lever_m * abs(step.yaw_rad)
+
+    def _turned(self, step: Motion) -> Matrix:
+        """Return the covariance that comes of a step's turn: the way follows the turn as it was made."""
+        p, turn = self._p, step.yaw_rad
+        by_turn = np.array([0.0, step.x_m, 1.0]) * p.turn_share * turn
+        return np.outer(by_turn, by_turn) + _diagonal(0.0, p.aside_share * step.x_m * turn, 0.0)
 
     def judge(self, costs: Iterable[tuple[int, float]]) -> None:
         """Process a look: -2 log likelihoods of the hypotheses with their models' numbers, the model's own included."""
@@ -154,7 +179,7 @@ class StepModels:
 def _scaled(covariance: Matrix, scale: float) -> Matrix:
     """Scale a forecast's standard deviations; that of the turn is mostly the error of the follower's own heading."""
     factors = np.array([scale, scale, min(scale, _TURN_SCALE)])
-    return factors[:, None] * covariance * factors
+    return np.asarray(factors[:, None] * covariance * factors)
 
 
 def _diagonal(x_m: float, y_m: float, yaw_rad: float) -> Matrix:
