@@ -166,6 +166,8 @@ def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation
 
         if scenario.world.real_time_factor > 0.0:
             raise FormationError("--in-process runs as fast as it can; leave --real-time-factor out")
+        if scenario.leader.path == "teleop":
+            raise FormationError("--path teleop is driven over ROS topics; leave --in-process out")
         return run_in_process(
             scenario, place.path, run_metadata(scenario), images=args.images, say=say, reservation=place
         )

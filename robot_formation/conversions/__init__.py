@@ -45,6 +45,7 @@ from robot_formation.conversions.motion import (  # noqa: E402
     read_joint_command,
     read_joint_states,
     read_move,
+    read_planar_twist,
     read_pose,
 )
 from robot_formation.conversions.vision import (  # noqa: E402
@@ -89,6 +90,7 @@ __all__ = [
     "read_joint_command",
     "read_joint_states",
     "read_move",
+    "read_planar_twist",
     "read_pose",
     "stamp_of",
     "string",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import JointState
 
@@ -151,6 +151,11 @@ def has_estimate(message: PoseWithCovarianceStamped) -> bool:
 def knows_turn(message: PoseWithCovarianceStamped) -> bool:
     """Return whether a displacement's turn was estimated."""
     return has_estimate(message) and float(message.pose.covariance[35]) >= 0.0
+
+
+def read_planar_twist(twist: Twist) -> tuple[float, float, float]:
+    """Read a velocity: ahead and to the left [m/s], anticlockwise [rad/s]; not-finite values are kept."""
+    return float(twist.linear.x), float(twist.linear.y), float(twist.angular.z)
 
 
 def odometry(motion: Motion, frame: str, child: str, stamp_ns: int) -> Odometry:

@@ -10,8 +10,16 @@ from types import MappingProxyType
 from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.geometry.se2 import Motion
 from robot_formation.leader.leader_motion import LeaderParameters
-from robot_formation.leader.paths import PATHS
-from robot_formation.leader.rigid_formation import Formation, centred_start, follower_step, room_around, swept
+from robot_formation.leader.paths import PATHS, LeaderPath
+from robot_formation.leader.rigid_formation import (
+    Formation,
+    Track,
+    around,
+    centred_start,
+    follower_step,
+    room_around,
+    track_of,
+)
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import plate_size
 
@@ -65,13 +73,20 @@ def path_start(
         return None
     try:
         plate_m = plate_size(world.surface, world.surface_parameters)
-        # A random walk goes where there is room, whatever its start.
         path = replace(leader, room_m=()).make_path()
     except ParameterError:
         return None
-    timesteps = 0 if leader.path == _WALK else leader.timesteps
-    extent = swept(formation(world, followers, distance_m), path, timesteps, math.radians(heading_deg))
-    return centred_start(extent, plate_m)
+    whole = formation(world, followers, distance_m)
+    return centred_start(swept_by(path, leader.timesteps, whole, math.radians(heading_deg)), plate_m)
+
+
+def swept_by(path: LeaderPath, timesteps: int, whole: Formation, heading_rad: float) -> Track:
+    """Box around all that a formation takes over a run from (0, 0); of a random walk, which goes where there is room,
+    its start's only. Lowest x, highest x, lowest y, highest y, metres.
+    """
+    steps = 0 if path.name == _WALK else timesteps
+    swept: Track = around(whole.boxes(track_of(path, steps, Motion(yaw_rad=heading_rad))))[-1]
+    return swept
 
 
 def with_room(

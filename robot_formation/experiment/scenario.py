@@ -21,7 +21,8 @@ from robot_formation.components.node_parameters import (
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
-from robot_formation.experiment.path_plan import KNOWN_STEP, known_step, path_start, with_room
+from robot_formation.experiment.path_check import PathCheck
+from robot_formation.experiment.path_plan import KNOWN_STEP, STRAIGHT, known_step, path_start, with_room
 from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
@@ -37,7 +38,7 @@ from robot_formation.parameters import (
     to_mapping,
 )
 from robot_formation.paths import config_dir
-from robot_formation.surface import SURFACES
+from robot_formation.surface import SURFACES, plate_size
 from robot_formation.system.yaml_files import YamlError, parse_yaml
 from robot_formation.vision.marker import MarkerKind
 
@@ -165,9 +166,28 @@ class Scenario:
                 f"drive: 'wheel_speed_rad_s' is {self.drive.wheel_speed_rad_s}, more than the world's "
                 f"'motor.max_speed_rad_s' of {fastest}: every move would be refused"
             )
+        if self.leader.path != STRAIGHT:
+            self.check_path()  # says more than that a start that was chosen for it is off the plate
         self.world.check()
         check_curves(self.drive, self.world, self.robots)
         check_camera(self.fine_tuner, self.world)
+        if self.leader.path == STRAIGHT:
+            self.check_path()
+
+    @property
+    def plate_m(self) -> float:
+        """Edge of the square plate."""
+        return plate_size(self.world.surface, self.world.surface_parameters)
+
+    def check_path(self, leader: LeaderParameters | None = None) -> None:
+        """Check that the leader's path can be made and followed; or that of another leader, say with another seed.
+
+        Raises:
+            ParameterError: naming the robot, the timestep and what would fit.
+        """
+        chosen = not any(entry in self.given for entry in START)
+        distance_m = self.fine_tuner.formation_distance_m
+        PathCheck(leader or self.leader, self.world, self.drive, distance_m, self.setup.followers, chosen).require()
 
 
 def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> Scenario:
@@ -364,7 +384,7 @@ def with_values(scenario: Scenario, values: Sequence[tuple[str, object]], *, sou
             setup[key] = value
     checked = {kind: _checked(kind, section, where=f"{source}: {kind}") for kind, section in sections.items()}
     # A start is that of the path that it was given with.
-    same_path = checked.get("leader", {}).get("path") == scenario.settings.get("leader", {}).get("path")
+    same_path = checked.get("leader", {}).get("path", scenario.leader.path) == scenario.leader.path
     given = {entry for entry in START if entry in dict(values) or (same_path and entry in scenario.given)}
     return build(from_mapping(Setup, setup, where=source), checked, given)
 

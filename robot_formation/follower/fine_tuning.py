@@ -75,7 +75,9 @@ class FineTunerParameters:
         high=2.0,
     )
     # The bodies are 8 cm apart in a formation of 32 cm: a wild forecast must not push the neighbour.
-    max_v_m: float = parameter(0.1, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2)
+    max_v_m: float = parameter(
+        0.15, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2
+    )
     max_u_m: float = parameter(
         0.075, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
     )

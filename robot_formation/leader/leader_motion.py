@@ -6,7 +6,7 @@ next timestep on the followers' bare ready ticks, which carry no pose and no vel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from robot_formation.geometry.se2 import Motion
@@ -71,11 +71,16 @@ class Leader:
     """Counts timesteps: waits for every follower's tick t-1, moves, ticks t, until the tour ends.
 
     With `paused` set no new timestep begins; `resume` goes on where it stopped.
+
+    Args:
+        parameters: what the leader does.
+        motion: of a timestep, instead of the path's; None while it isn't known, and the timestep doesn't begin.
     """
 
-    def __init__(self, parameters: LeaderParameters) -> None:
+    def __init__(self, parameters: LeaderParameters, motion: Callable[[int], Motion | None] | None = None) -> None:
         self._parameters = parameters
         self.path = parameters.make_path()
+        self._motion = motion or self.path.motion
         self._ready: dict[str, int] = dict.fromkeys(parameters.followers, -1)
         self._moving = False
         self.timestep = 0
@@ -105,6 +110,10 @@ class Leader:
         self._moving = False
         return LeaderAction(done=self.timestep)
 
+    def go(self) -> LeaderAction:
+        """Begin the next timestep if all are ready for it and its motion is known now."""
+        return self._next()
+
     def resume(self) -> LeaderAction:
         """Go on after `paused`."""
         self.paused = False
@@ -116,6 +125,9 @@ class Leader:
         if self.timestep == self._parameters.timesteps:
             self.finished = True
             return LeaderAction(finished=True)
+        motion = self._motion(self.timestep + 1)
+        if motion is None:
+            return NOTHING
         self.timestep += 1
         self._moving = True
-        return LeaderAction(move=self.path.motion(self.timestep))
+        return LeaderAction(move=motion)

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from robot_formation.geometry.se2 import Motion
 from robot_formation.leader.paths import LeaderPath, Room, poses
+
+Track = NDArray[np.float64]
 
 MARGIN_M = 0.05
 """Left free around the bodies where a start is chosen: robots slip, and a formation is never exact."""
@@ -17,9 +23,10 @@ def follower_step(step: Motion, number: int, distance_m: float) -> Motion:
 
     T_n = O^-1 T O, where O leads from the leader to the follower's place, number * distance_m to its right.
     """
+    if not step.yaw_rad:
+        return step  # the same for all, without rounding
     place = Motion(0.0, -number * distance_m)
-    moved = place.inverse().then(step).then(place)
-    return Motion(moved.x_m, moved.y_m + 0.0, moved.yaw_rad)
+    return place.inverse().then(step).then(place)
 
 
 @dataclass(frozen=True)
@@ -38,63 +45,49 @@ class Formation:
     length_m: float
     width_m: float
 
-    def corners(self, leader: Motion, number: int) -> list[tuple[float, float]]:
-        """List the corners of a robot's body in the frame that the leader's pose is in, metres."""
-        robot = leader.then(Motion(0.0, -number * self.distance_m))
-        ends = [(x * 0.5 * self.length_m, y * 0.5 * self.width_m) for x in (1.0, -1.0) for y in (1.0, -1.0)]
-        placed = (robot.then(Motion(x, y)) for x, y in ends)
-        return [(corner.x_m, corner.y_m) for corner in placed]
+    def boxes(self, track: Track, robots: Sequence[int] = ()) -> Track:
+        """Boxes around the bodies at each of the leader's poses, along the axes of the frame that these are in.
 
-    def extent(self, leader: Motion) -> Extent:
-        """Area that all bodies take with the leader at a pose; a box along the axes of the frame that it is in."""
+        Args:
+            track: x, y [m] and heading [rad] of the leader, shape (n, 3).
+            robots: numbers of the robots that count, 0 for the leader; none given: all.
+
+        Returns:
+            Lowest x, highest x, lowest y and highest y of each box, shape (n, 4), metres.
+        """
+        cosine, sine = np.cos(track[:, 2]), np.sin(track[:, 2])
+        half_x = 0.5 * (np.abs(cosine) * self.length_m + np.abs(sine) * self.width_m)
+        half_y = 0.5 * (np.abs(sine) * self.length_m + np.abs(cosine) * self.width_m)
         # The robots stand in a row: those at its ends reach farthest.
-        found = [corner for number in {0, self.followers} for corner in self.corners(leader, number)]
-        xs, ys = [x for x, _ in found], [y for _, y in found]
-        return Extent(min(xs), max(xs), min(ys), max(ys))
-
-
-@dataclass(frozen=True)
-class Extent:
-    """A box along two axes, metres."""
-
-    low_x_m: float
-    high_x_m: float
-    low_y_m: float
-    high_y_m: float
-
-    @property
-    def size_m(self) -> float:
-        """Its longer side."""
-        return max(self.high_x_m - self.low_x_m, self.high_y_m - self.low_y_m)
-
-    @property
-    def middle(self) -> tuple[float, float]:
-        """Its centre."""
-        return 0.5 * (self.low_x_m + self.high_x_m), 0.5 * (self.low_y_m + self.high_y_m)
-
-    def joined(self, other: Extent) -> Extent:
-        """Return the smallest box around both."""
-        return Extent(
-            min(self.low_x_m, other.low_x_m),
-            max(self.high_x_m, other.high_x_m),
-            min(self.low_y_m, other.low_y_m),
-            max(self.high_y_m, other.high_y_m),
+        places = [self.distance_m * number for number in robots or (0, self.followers)]
+        xs = np.array([track[:, 0] + place * sine for place in places])
+        ys = np.array([track[:, 1] - place * cosine for place in places])
+        return np.stack(
+            [xs.min(0) - half_x, xs.max(0) + half_x, ys.min(0) - half_y, ys.max(0) + half_y],
+            axis=1,
         )
 
 
-def swept(formation: Formation, path: LeaderPath, timesteps: int, heading_rad: float) -> Extent:
-    """Area that all bodies take over a run whose leader starts at the origin with a heading; along the world's axes."""
-    start = Motion(yaw_rad=heading_rad)
-    found = formation.extent(start)
-    for pose in poses(path, timesteps)[1:]:
-        found = found.joined(formation.extent(start.then(pose)))
-    return found
+def track_of(path: LeaderPath, timesteps: int, start: Motion) -> Track:
+    """Return the leader's poses, start and end of every timestep: x, y [m] and heading [rad], (timesteps + 1, 3)."""
+    return np.array([(pose.x_m, pose.y_m, pose.yaw_rad) for pose in poses(path, timesteps, start)])
 
 
-def centred_start(extent: Extent, plate_m: float) -> tuple[float, float]:
-    """Return the leader's start, world x and y, that puts the middle of what is swept from (0, 0) on the plate's."""
-    x_m, y_m = extent.middle
-    return 0.5 * plate_m - x_m, 0.5 * plate_m - y_m
+def around(boxes: Track) -> Track:
+    """Return the box around all boxes up to each one, shape (n, 4)."""
+    low, high = np.minimum.accumulate, np.maximum.accumulate
+    return np.stack([low(boxes[:, 0]), high(boxes[:, 1]), low(boxes[:, 2]), high(boxes[:, 3])], axis=1)
+
+
+def centred_start(swept: Track, plate_m: float) -> tuple[float, float]:
+    """Return the leader's start, world x and y, that puts the middle of what is swept from (0, 0) on the plate's.
+
+    Args:
+        swept: the box around everything, shape (4,).
+        plate_m: edge of the plate.
+    """
+    low_x, high_x, low_y, high_y = map(float, swept)
+    return 0.5 * (plate_m - low_x - high_x), 0.5 * (plate_m - low_y - high_y)
 
 
 def room_around(formation: Formation, start: Motion, plate_m: float) -> Room:
@@ -102,9 +95,9 @@ def room_around(formation: Formation, start: Motion, plate_m: float) -> Room:
 
     The room is a rectangle along the leader's axes; where those are not the plate's, the largest one of equal sides.
     """
-    at = formation.extent(start)
-    east, west = plate_m - MARGIN_M - at.high_x_m, at.low_x_m - MARGIN_M
-    north, south = plate_m - MARGIN_M - at.high_y_m, at.low_y_m - MARGIN_M
+    low_x, high_x, low_y, high_y = map(float, formation.boxes(np.array([(start.x_m, start.y_m, start.yaw_rad)]))[0])
+    east, west = plate_m - MARGIN_M - high_x, low_x - MARGIN_M
+    north, south = plate_m - MARGIN_M - high_y, low_y - MARGIN_M
     quarter = math.remainder(start.yaw_rad, 2.0 * math.pi) / (0.5 * math.pi)
     sides = [max(side, 0.0) for side in (east, north, west, south)]
     if abs(quarter - round(quarter)) < 1e-9:

@@ -27,8 +27,9 @@ from robot_formation.parameters import ParameterError, from_mapping, read_texts,
 __all__ = ["PATHS", "Given", "LeaderPath", "PathKind", "Room", "Teleop", "make_path", "path_kind", "poses"]
 
 _KINDS: tuple[type[PathKind], ...] = (
-    Straight, Circle, Arc, Slalom, Pulse, Lemniscate, Lissajous, Stadium, Clothoid, Switch, RandomWalk, Waypoints, Teleop,
-)  # fmt: skip
+    *(Straight, Circle, Arc, Slalom, Pulse, Lemniscate, Lissajous, Stadium, Clothoid),
+    *(Switch, RandomWalk, Waypoints, Teleop),
+)
 
 PATHS: Mapping[str, type[PathKind]] = MappingProxyType({kind.name: kind for kind in _KINDS})
 """Families of paths by name."""
@@ -54,7 +55,8 @@ def make_path(name: str, texts: Sequence[str] = (), given: Given = _NOTHING) -> 
 
     Args:
         name: a key of `PATHS`.
-        texts: values for the path's own parameters; the others keep their defaults.
+        texts: values for the path's own parameters; the others keep their defaults. One like 'circle.period=12' is for
+            that path alone, so that several paths can share texts.
         given: the leader's step and seed, and the room that it has.
 
     Raises:
@@ -62,8 +64,7 @@ def make_path(name: str, texts: Sequence[str] = (), given: Given = _NOTHING) -> 
     """
     kind, where = path_kind(name), f"path '{name}'"
     known = specs(kind)
-    dotted = {text.partition("=")[0]: text.partition("=")[2] for text in texts if "." in text.partition("=")[0]}
-    own = [text for text in texts if kind is not Switch or text.partition("=")[0] not in dotted]
+    own, of_parts = _sorted_by_owner(name, texts)
     values: dict[str, Json] = read_texts(kind, own, where=where, example="period=12")
     if "step_m" in known:
         values.setdefault("step_m", given.step_m)
@@ -71,5 +72,24 @@ def make_path(name: str, texts: Sequence[str] = (), given: Given = _NOTHING) -> 
         values.setdefault("phase", float(given.random("phase").random()))
     made = from_mapping(kind, values, where=where)
     if isinstance(made, Switch):
-        return made.joined(given, dotted, make_path)
+        return made.joined(given, of_parts, make_path)
     return made.prepared(given)
+
+
+def _sorted_by_owner(name: str, texts: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """Return a path's own texts, and the values by name of those that belong to other paths.
+
+    Raises:
+        ParameterError: if a text is for a path that doesn't exist.
+    """
+    own, others = [], {}
+    for text in texts:
+        key, _, value = text.partition("=")
+        owner, dot, parameter_name = key.strip().partition(".")
+        if not dot:
+            own.append(text)
+        elif path_kind(owner) is path_kind(name):
+            own.append(f"{parameter_name}={value}")
+        else:
+            others[key.strip()] = value.strip()
+    return own, others

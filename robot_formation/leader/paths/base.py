@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
 
@@ -14,6 +13,8 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import Choice
 
 Point = tuple[float, float]
+
+_ORIGIN = Motion()
 
 
 @runtime_checkable
@@ -128,14 +129,9 @@ class Curve(PathKind):
         return Motion(*self.point(time), heading)
 
 
-def pose_after(path: LeaderPath, timesteps: int) -> Motion:
-    """Return the leader's pose after a number of timesteps, in the frame of its start."""
-    return poses(path, timesteps)[-1]
-
-
-def poses(path: LeaderPath, timesteps: int) -> Sequence[Motion]:
+def poses(path: LeaderPath, timesteps: int, start: Motion = _ORIGIN) -> list[Motion]:
     """List the leader's poses from its start to the end of the last timestep, timesteps + 1 of them."""
-    found = [Motion()]
+    found = [start]
     for timestep in range(1, timesteps + 1):
         found.append(found[-1].then(path.motion(timestep)))
     return found

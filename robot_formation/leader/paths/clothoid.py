@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import ClassVar
@@ -15,7 +16,6 @@ from robot_formation.leader.paths.waves import PHASE
 from robot_formation.parameters import Choice, parameter
 
 _NODES, _WEIGHTS = (tuple(map(float, values)) for values in np.polynomial.legendre.leggauss(8))
-_PIECES = 8
 
 
 class Sides(Choice):
@@ -46,15 +46,22 @@ class Clothoid(PathKind):
         x_m = y_m = 0.0
         start = self._turned(timestep - 1.0)
         origin = start if self.heading is Heading.ALONG else self._turned(0.0)
-        half = 0.5 / _PIECES
-        for piece in range(_PIECES):
-            middle = timestep - 1.0 + (2 * piece + 1) * half
+        for begin, end in itertools.pairwise(self._pieces(timestep)):
+            middle, half = 0.5 * (begin + end), 0.5 * (end - begin)
             for node, weight in zip(_NODES, _WEIGHTS, strict=True):
                 angle = self._turned(middle + half * node) - origin
                 x_m += weight * half * self.step_m * math.cos(angle)
                 y_m += weight * half * self.step_m * math.sin(angle)
         turn = self._turned(float(timestep)) - start if self.heading is Heading.ALONG else 0.0
         return Motion(x_m, y_m, turn)
+
+    def _pieces(self, timestep: int) -> list[float]:
+        """List the ends of a timestep, and the times in it when the curvature begins to rise or to fall."""
+        half, offset = 0.5 * self.period, self.phase * self.period
+        first = math.floor((timestep - 1 + offset) / half) + 1
+        last = math.ceil((timestep + offset) / half)
+        kinks = [number * half - offset for number in range(first, last)]
+        return [timestep - 1.0, *(kink for kink in kinks if timestep - 1 < kink < timestep), float(timestep)]
 
     def _turned(self, time: float) -> float:
         """Integral of the curvature over the way driven since time 0 of phase 0, radians."""

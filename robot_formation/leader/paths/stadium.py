@@ -17,10 +17,10 @@ class Stadium(Curve):
 
     name: ClassVar[str] = "stadium"
     step_m: float = STEP
-    length_m: float = parameter(0.4, "length of each straight", unit="m", low=0.0, high=100.0)
-    radius_m: float = parameter(0.3, "radius of the half circles", unit="m", low=0.01, high=100.0)
+    length_m: float = parameter(0.3, "length of each straight", unit="m", low=0.0, high=100.0)
+    radius_m: float = parameter(0.4, "radius of the half circles", unit="m", low=0.01, high=100.0)
     heading: Heading = parameter(Heading.ALONG, "where the leader looks")
-    direction: Direction = parameter(Direction.LEFT, "to which side it bends")
+    direction: Direction = parameter(Direction.RIGHT, "to which side it bends")
     phase: float = parameter(
         0.0,
         "where in the lap timestep 1 begins, from a straight's start; not given: by the seed",

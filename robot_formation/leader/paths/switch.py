@@ -47,20 +47,17 @@ class Switch(PathKind):
         """Return the path, its parts made by `make`.
 
         Raises:
-            ParameterError: if a part can't be made, or the texts name none.
+            ParameterError: if a part can't be made.
         """
         sequence = self.sequence()
         names = [name for name, _ in sequence]
-        for key in texts:
-            if key.partition(".")[0] not in names:
-                raise ParameterError(f"path 'switch': '{key}' belongs to none of its parts, {', '.join(names)}")
         made: dict[str, LeaderPath] = {}
         for name in names:
             if name in (Switch.name, "teleop", "random_walk"):
                 raise ParameterError(f"path 'switch': '{name}' can't be a part of it")
-            own = [f"{key[len(name) + 1 :]}={value}" for key, value in texts.items() if key.startswith(f"{name}.")]
+            own = [f"{key}={value}" for key, value in texts.items()]
             made[name] = made.get(name) or make(name, own, given)
-        return _Joined([(made[name], count) for name, count in sequence])
+        return _Joined(tuple((made[name], count) for name, count in sequence))
 
 
 @dataclass(frozen=True)
