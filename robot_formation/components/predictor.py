@@ -86,6 +86,14 @@ class PredictorComponent(Component):
         ):
             if array is not None:
                 values[name] = np.array2string(array, precision=6, separator=", ").replace("\n", "")
+        if diagnostics.consistency is not None:
+            values["consistency index"] = f"{diagnostics.consistency:.4g}"
+        if diagnostics.qualities is not None:
+            values["periods (residual, noise)"] = ", ".join(
+                f"{found.period:.1f} ({found.residual:.2f}, {found.noise:.2f}{', spurious' * found.spurious})"
+                for found in diagnostics.qualities
+                if found.period is not None and found.eigenvalue.imag >= 0.0
+            )
         values.update(diagnostics.notes or {})
         if diagnostics.condition_number is not None:
             values["condition number"] = f"{diagnostics.condition_number:.4g}"

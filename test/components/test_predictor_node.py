@@ -64,10 +64,10 @@ def test_predictions_and_covariances_are_the_models_own_with_u_and_v_turned_into
         displacement, residual = report(Motion.from_uv(u, v), stamp_ns)
         wire.give("displacement", displacement)
         ((_, message),) = wire.give("residual", residual)
-        model.observe(np.array([u, v]), np.zeros(2))
+        model.observe(np.array([u, v, 0.0]), np.zeros(3))
         forecast = model.predict()
         found = conversions.read_displacement(message)
-        assert (found.u_m, found.v_m) == tuple(forecast.mean)
+        assert (found.u_m, found.v_m) == tuple(forecast.mean[:2])
         xy = np.reshape(message.pose.covariance, (6, 6))[:2, :2]
         uu, uv, vv = forecast.covariance[0, 0], forecast.covariance[0, 1], forecast.covariance[1, 1]
         assert xy == pytest.approx(np.array([[vv, -uv], [-uv, uu]]), abs=1e-20)
@@ -197,17 +197,18 @@ def test_the_predictor_gets_residual_and_command_and_publishes_the_command() -> 
         motions = [Motion.from_uv(*value) for value in (x, r, c)]
         answers = give(wire, stamp_ns, motions[0], motions[1], None if none else motions[2])
         # The first timestep's command is not used, in whatever order it comes.
+        x, r, c = (np.append(value, 0.0) for value in (x, r, c))
         model.observe(x, r, None if none or stamp_ns == 1 else c)
         ((_, message),) = [answer for found in answers.values() for answer in found]
         forecast, found = model.predict(), conversions.read_displacement(message)
-        assert (found.u_m, found.v_m) == tuple(forecast.command)
+        assert (found.u_m, found.v_m) == tuple(forecast.command[:2])
         about = forecast.about_command
         xy = np.reshape(message.pose.covariance, (6, 6))[:2, :2]
         assert xy == pytest.approx(np.array([[about[1, 1], -about[0, 1]], [-about[0, 1], about[0, 0]]]), abs=1e-20)
     assert isinstance(wire.component, PredictorComponent)
-    assert wire.component.actuation_bias() == tuple(forecast.mean - forecast.command)
+    assert wire.component.actuation_bias() == tuple((forecast.mean - forecast.command)[:2])
     assert max(map(abs, wire.component.actuation_bias())) > 0.001
-    assert {"residual [m]", "actuation bias [m]", "weight of koopman"} <= set(wire.component.details())
+    assert {"residual [m]", "actuation bias [m]", "weights along u"} <= set(wire.component.details())
 
 
 # --- state file -----------------------------------------------------------------------------------------------------

@@ -14,7 +14,8 @@ With turns, r and w are motions in the plane: the ideal motion is total_t o r_t 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -211,12 +212,9 @@ class ActuationBias:
 class Closing:
     """A model of w, with the residual closed and the actuation bias learned."""
 
-    def __init__(
-        self, parameters: ClosingParameters, model: Spatial, judge: Callable[[Vector], None] | None = None
-    ) -> None:
-        """Wrap a model in residual feedback; `judge` is told every w as the camera saw it, before the model gets it."""
+    def __init__(self, parameters: ClosingParameters, model: Spatial) -> None:
+        """Wrap a model in residual feedback."""
         self._model = model
-        self._judge = judge
         self._filter = ClosedResidual(parameters)
         self._bias = ActuationBias(parameters)
 
@@ -228,8 +226,6 @@ class Closing:
         if blind and not found.seen:  # nothing is known about residuals: displacements are all there is
             self._model.observe(displacement)
             return
-        if self._judge is not None and residual is not None:
-            self._judge(displacement[:2] + residual[:2] - found.residual[:2])
         found.observe(displacement, residual)
         if blind:
             self._model.advance()
@@ -265,7 +261,7 @@ class Closing:
             notes[name] = np.array2string(value, precision=6, separator=", ")
         for name, turn in (("residual turn [rad]", residual[2]), ("actuation bias of the turn [rad]", bias[2])):
             notes[name] = f"{turn:.6g}"
-        return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
+        return replace(inner, notes=notes)
 
     def state(self) -> JsonObject:
         """Return all that it has learned."""

@@ -10,6 +10,7 @@ from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.online_dmd import OnlineDMD
 from robot_formation.koopman.predictors.dictionary_text import dictionary_from_text
 from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Vector, array, optional, vector
+from robot_formation.koopman.predictors.pair_log import PairLog
 from robot_formation.koopman.predictors.parameters import EdmdParameters, PredictorParameters
 from robot_formation.koopman.windowed_dmd import WindowedDMD
 
@@ -17,6 +18,8 @@ from robot_formation.koopman.windowed_dmd import WindowedDMD
 _LARGEST_STATE_M = 1e100
 # No robot goes farther in a timestep; monomials of what is put into the delays blindly must stay finite.
 _LARGEST_BLIND_M = 10.0
+# Noise of a displacement, by which diagnostics tell eigenvalues of the leader's from those of noise.
+_NOISE_M = 0.0025
 
 
 class Literal:
@@ -91,12 +94,14 @@ class Measured:
         self._last: Vector | None = None
         self._measured = True
         self._innovation: Vector | None = None
+        self._log = PairLog(2)
 
     def observe(self, x: Vector) -> None:
         """See `Model`; a pair is learned from only if both of its displacements were measured."""
         if self._last is not None and self._measured:
             self._innovation = self._dmd.learn(self._last, x)  # checked by the predictor
             self._pairs += 1
+            self._log.add(self._last, x)
         self._last, self._measured = x, True
 
     def advance(self) -> None:
@@ -118,7 +123,10 @@ class Measured:
         """See `Model`."""
         if self._pairs < 2:
             return Diagnostics()
-        return Diagnostics(self._dmd.k, self._dmd.condition_number, self._innovation)
+        consistency, qualities = self._log.judge(self._dmd.k, np.full(2, _NOISE_M))
+        return Diagnostics(
+            self._dmd.k, self._dmd.condition_number, self._innovation, consistency=consistency, qualities=qualities
+        )
 
     def state(self) -> JsonObject:
         """See `Model`."""
@@ -128,6 +136,7 @@ class Measured:
             "last": optional(self._last),
             "measured": self._measured,
             "innovation": optional(self._innovation),
+            "log": self._log.state(),
         }
 
     def restore(self, state: Mapping[str, Json]) -> None:
@@ -137,6 +146,7 @@ class Measured:
         self._pairs = int(state["pairs"])
         self._last = vector(state["last"]) if state["last"] is not None else None
         self._measured = bool(state["measured"])
+        self._log.restore(state["log"])
         self._innovation = vector(state["innovation"]) if state["innovation"] is not None else None
 
 
@@ -149,6 +159,8 @@ class Edmd:
     def __init__(self, parameters: PredictorParameters | EdmdParameters) -> None:
         p = self._p = parameters.edmd if isinstance(parameters, PredictorParameters) else parameters
         self._dictionary = dictionary_from_text(p.dictionary)
+        self.text = p.dictionary
+        """The dictionary in words."""
         self._rows = [row for row in self._dictionary.state_rows if row is not None]
         size = self._dictionary.size
         self._dmd: OnlineDMD | WindowedDMD = (
@@ -160,6 +172,7 @@ class Edmd:
         self._lifted: Vector | None = None
         self._measured = True
         self._innovation: Vector | None = None
+        self._log = PairLog(size)
 
     def observe(self, x: Vector) -> None:
         """See `Model`; a pair is learned from only if its second displacement and the one before were measured."""
@@ -167,6 +180,7 @@ class Edmd:
         if lifted is not None:
             if self._lifted is not None and self._measured:
                 self._innovation = self._dmd.update(self._lifted, lifted)
+                self._log.add(self._lifted, lifted)
             self._lifted = lifted
         self._measured = True
 
@@ -199,7 +213,12 @@ class Edmd:
         """See `Model`; the innovation is that of the state, in metres."""
         innovation = None if self._innovation is None else self._p.scale_m * self._innovation[self._rows]
         notes = {"observables": ", ".join(self._dictionary.names)}
-        return Diagnostics(self._dmd.k, self._dmd.condition_number, innovation, notes)
+        constant = np.array([name == "1" for name in self._dictionary.names])
+        noise = np.where(constant, 0.0, _NOISE_M / self._p.scale_m)
+        consistency, qualities = self._log.judge(self._dmd.k, noise)
+        return Diagnostics(
+            self._dmd.k, self._dmd.condition_number, innovation, notes, consistency=consistency, qualities=qualities
+        )
 
     def state(self) -> JsonObject:
         """See `Model`."""
@@ -209,6 +228,7 @@ class Edmd:
             "lifted": optional(self._lifted),
             "measured": self._measured,
             "innovation": optional(self._innovation),
+            "log": self._log.state(),
         }
 
     def restore(self, state: Mapping[str, Json]) -> None:
@@ -219,6 +239,7 @@ class Edmd:
         self._history = [vector(x) for x in state["history"]]
         self._lifted = vector(state["lifted"], size) if state["lifted"] is not None else None
         self._measured = bool(state["measured"])
+        self._log.restore(state["log"])
         self._innovation = vector(state["innovation"], size) if state["innovation"] is not None else None
 
 

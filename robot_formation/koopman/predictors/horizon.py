@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.models import Matrix, Vector, array
-from robot_formation.koopman.predictors.spatial import after, between, ways
+from robot_formation.koopman.predictors.spatial import after, rotated, ways
 
 MOST_STEPS = 10
 """Timesteps ahead whose errors are observed; farther ones are scaled up from these."""
@@ -46,28 +46,37 @@ class HorizonErrors:
         self._ways: NDArray[np.float64] = np.zeros((MOST_STEPS, 3, 3))
         self._weights: NDArray[np.float64] = np.zeros((2, MOST_STEPS))
         # Forecasts not yet judged to their end, newest first: displacements, ways, and the way driven since.
-        self._pending: list[tuple[Matrix, Matrix, Vector]] = []
+        self._pending = np.zeros((0, MOST_STEPS, 3))
+        self._expected = np.zeros((0, MOST_STEPS, 3))
+        self._driven = np.zeros((0, 3))
         self._residual: Vector | None = None
 
     def forecast(self, steps: Matrix) -> None:
         """Keep forecast displacements (`MOST_STEPS`, 3) to compare them with what comes."""
-        self._pending = [(steps, ways(steps), np.zeros(3)), *self._pending[: MOST_STEPS - 1]]
+        keep = MOST_STEPS - 1
+        self._pending = np.concatenate([steps[None], self._pending[:keep]])
+        self._expected = np.concatenate([ways(steps)[None], self._expected[:keep]])
+        self._driven = np.concatenate([np.zeros((1, 3)), self._driven[:keep]])
 
     def observe(self, total: Vector, residual: Vector | None) -> None:
         """Compare with a timestep's total (3,) and the residual (3,) at its end, None if nobody saw it."""
-        self._pending = [(steps, way, after(driven, total)) for steps, way, driven in self._pending]
+        driven = self._driven = _all_after(self._driven, total)
         before, self._residual = self._residual, residual
-        if residual is None:
+        count = len(driven)
+        if residual is None or not count:
             return
-        w = None if before is None else between(before, after(total, residual))
-        for number, (steps, way, driven) in enumerate(self._pending):
-            self._count(self._ways, 0, number, after(driven, residual) - way[number])
-            if number and w is not None:
-                self._count(self._steps, 1, number, w - steps[number])
+        numbers = np.arange(count)
+        errors = _all_after(driven, residual) - self._expected[numbers, numbers]
+        self._count(self._ways, 0, errors)
+        if before is not None:
+            w = _from(before, after(total, residual))
+            self._count(self._steps, 1, w - self._pending[numbers, numbers])
 
-    def _count(self, moments: NDArray[np.float64], kind: int, number: int, error: Vector) -> None:
-        moments[number] = self._discount * moments[number] + np.outer(error, error)
-        self._weights[kind, number] = self._discount * self._weights[kind, number] + 1.0
+    def _count(self, moments: NDArray[np.float64], kind: int, errors: Matrix) -> None:
+        """Add errors (n, 3) of forecasts 1 to n timesteps ahead."""
+        count, keep = len(errors), self._discount
+        moments[:count] = keep * moments[:count] + errors[:, :, None] * errors[:, None, :]
+        self._weights[kind, :count] = keep * self._weights[kind, :count] + 1.0
 
     def covariances(self, first: Matrix, steps: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return covariances (steps, 3, 3) of displacements and of ways; `first` (3, 3) is that of the next one."""
@@ -87,7 +96,8 @@ class HorizonErrors:
             "steps": self._steps.tolist(),
             "ways": self._ways.tolist(),
             "weights": self._weights.tolist(),
-            "pending": [[steps.tolist(), driven.tolist()] for steps, _, driven in self._pending],
+            "pending": self._pending.tolist(),
+            "driven": self._driven.tolist(),
             "residual": None if self._residual is None else self._residual.tolist(),
         }
 
@@ -98,6 +108,24 @@ class HorizonErrors:
         self._weights = array(state["weights"], *self._weights.shape)
         if (self._weights < 0.0).any():
             raise ValueError("a weight is negative")
-        pending = [(array(steps, MOST_STEPS, 3), array(driven, 3)) for steps, driven in state["pending"]]
-        self._pending = [(steps, ways(steps), driven) for steps, driven in pending[:MOST_STEPS]]
+        count = len(state["pending"])
+        if count > MOST_STEPS:
+            raise ValueError(f"more than {MOST_STEPS} forecasts are pending")
+        self._pending = array(state["pending"], count, MOST_STEPS, 3) if count else np.zeros((0, MOST_STEPS, 3))
+        self._driven = array(state["driven"], count, 3) if count else np.zeros((0, 3))
+        self._expected = np.array([ways(steps) for steps in self._pending]).reshape(count, MOST_STEPS, 3)
         self._residual = None if state["residual"] is None else array(state["residual"], 3)
+
+
+def _all_after(first: Matrix, second: Vector) -> Matrix:
+    """Compose motions (n, 3) with one (3,) that follows each of them."""
+    headings = first[:, 2]
+    if not headings.any():
+        return np.asarray(first + second)
+    cosines, sines, (u, v, turn) = np.cos(headings), np.sin(headings), second.tolist()
+    return np.asarray(first + np.stack([cosines * u - sines * v, sines * u + cosines * v, 0 * sines + turn], axis=1))
+
+
+def _from(before: Vector, now: Vector) -> Vector:
+    """Return the motion (3,) that leads from one pose to another."""
+    return np.append(rotated(now[:2] - before[:2], -float(before[2])), now[2] - before[2])

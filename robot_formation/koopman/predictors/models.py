@@ -5,7 +5,9 @@ State x_t = (u_t, v_t), metres, u to the right and v forward; or the turn (1,), 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import base64
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.parameters import PredictorParameters, TrendParameters
+from robot_formation.koopman.quality import EigenvalueQuality
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -27,6 +30,12 @@ class Diagnostics:
     condition_number: float | None = None
     innovation: Vector | None = None
     notes: Mapping[str, str] | None = None
+    weights: Mapping[str, Mapping[str, float]] | None = None
+    """Of a predictor's experts, by axis and name."""
+    consistency: float | None = None
+    """Consistency index of the dictionary; see `consistency_index`."""
+    qualities: Sequence[EigenvalueQuality] | None = None
+    """What the newest pairs say of K's eigenvalues."""
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128] | None:
@@ -263,6 +272,25 @@ def covariance(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
     if not (found == turned).all() or not (eigenvalues[..., 0] >= -1e-9 * abs(eigenvalues[..., -1])).all():
         raise ValueError("covariance matrices are expected")
     return found
+
+
+def packed(values: NDArray[np.float64]) -> str:
+    """Write an array into a state, as text (base64 of little-endian doubles): exact, and short for long ones."""
+    return base64.b64encode(values.astype("<f8").tobytes()).decode("ascii")
+
+
+def unpacked(text: str, *shape: int) -> NDArray[np.float64]:
+    """Read an array of this shape that `packed` wrote.
+
+    Raises:
+        ValueError: if it is damaged, has another shape, or is not finite.
+    """
+    if not isinstance(text, str):
+        raise ValueError(f"packed numbers of shape {shape} are expected")
+    values = np.frombuffer(base64.b64decode(text, validate=True), dtype="<f8")
+    if values.size != math.prod(shape):
+        raise ValueError(f"{math.prod(shape)} packed numbers are expected, not {values.size}")
+    return array(values.reshape(shape), *shape)
 
 
 def optional(values: Vector | None) -> list[float] | None:

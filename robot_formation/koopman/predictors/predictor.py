@@ -17,7 +17,7 @@ from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.linear_algebra import KoopmanError
 from robot_formation.koopman.predictors.closing import Closing
 from robot_formation.koopman.predictors.dmd import Edmd, Literal, Measured
-from robot_formation.koopman.predictors.formation import Mixture
+from robot_formation.koopman.predictors.formation import Formation
 from robot_formation.koopman.predictors.horizon import MOST_STEPS, Ahead, HorizonErrors
 from robot_formation.koopman.predictors.models import (
     Diagnostics,
@@ -32,7 +32,7 @@ from robot_formation.koopman.predictors.models import (
     optional,
     vector,
 )
-from robot_formation.koopman.predictors.parameters import CLOSABLE, NAMES, PredictorParameters
+from robot_formation.koopman.predictors.parameters import CLOSABLE, NAMES, TREND_CLOSE, PredictorParameters
 from robot_formation.koopman.predictors.spatial import Spatial, after, between, ways
 from robot_formation.parameters import suggestion
 
@@ -48,8 +48,16 @@ MODELS: dict[str, Callable[[PredictorParameters], Model]] = {
     "literal": Literal,
     "measured": Measured,
     "edmd": Edmd,
-    "formation": Mixture,
 }
+"""Models of (u, v)."""
+
+EXPERTS: dict[str, tuple[str, ...]] = {
+    "formation": (
+        "persistence", "trends", "oscillators", "overtones", "rotation", "dmd", "delays 3", "delays 6",
+    ),
+    TREND_CLOSE: ("trends",),
+}  # fmt: skip
+"""Predictors that are made of experts, and of which."""
 
 TURN_MODELS: dict[str, Callable[[PredictorParameters, int], Model]] = {"ewma": Ewma, "kalman_trend": KalmanTrend}
 """Models of the turn by itself; for the others the previous turn."""
@@ -61,8 +69,9 @@ DESCRIPTIONS: dict[str, str] = {
     "measured": "online DMD with measured pairs: the paper's algorithm as it must be meant",
     "edmd": "online EDMD with a dictionary of yours (predictor.edmd.dictionary) and a prior",
     "literal": "the paper's Algorithm 1 as printed, which is blind after three displacements",
-    "formation": "the project's own: residual and actuation bias closed, persistence and EDMD weighted",
+    "formation": "the project's own: closing, with filters, Koopman oscillators and delay-embedded DMD weighted",
     **{f"{name}{CLOSE}": f"{name}, with residual and actuation bias closed" for name in CLOSABLE},
+    TREND_CLOSE: "Kalman filters of levels and trends, with residual and actuation bias closed; no Koopman operator",
 }
 """What each of `NAMES` is, in a line."""
 
@@ -101,13 +110,13 @@ class Predictor:
         if name not in NAMES:
             raise PredictionError(f"no predictor '{name}'{suggestion(name, NAMES)}")
         inner = name.removesuffix(CLOSE)
-        model = MODELS[inner](parameters)
-        self._model = Spatial(model, TURN_MODELS.get(inner, Previous)(parameters, 1))
-        self._closing: Closing | None = None
-        if isinstance(model, Mixture):
-            self._closing = Closing(parameters.closing, self._model, model.judge)
-        elif name.endswith(CLOSE):
-            self._closing = Closing(parameters.closing, self._model)
+        self._closing: Closing | Formation | None = None
+        if name in EXPERTS:
+            self._closing = Formation(parameters, EXPERTS[name])
+        else:
+            self._model = Spatial(MODELS[inner](parameters), TURN_MODELS.get(inner, Previous)(parameters, 1))
+            if name.endswith(CLOSE):
+                self._closing = Closing(parameters.closing, self._model)
         self._weight = parameters.sigma_weight
         sigmas = np.array([parameters.sigma_u_m, parameters.sigma_v_m, parameters.sigma_turn_rad])
         self._errors: Matrix = np.diag(sigmas**2 * self._weight)
