@@ -128,7 +128,7 @@ def write_log(log: DisplacementLog, path: str | Path) -> None:
     Raises:
         AnalysisError: the file exists already, or can't be written.
     """
-    arrays = [(DISPLACEMENT, log.displacements)]
+    arrays: list[tuple[tuple[str, ...], NDArray[np.float64]]] = [(DISPLACEMENT, log.displacements)]
     arrays += [(RESIDUAL, log.residuals)] if log.has_residuals else []
     arrays += [(COMMANDED, log.commanded)] if log.has_commanded else []
     if not log.has_turns:

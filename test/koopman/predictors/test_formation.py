@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pytest
 
 from cases import case
-from predictor_helpers import predictor, whole
+from predictor_helpers import predictor
 from robot_formation.koopman.predictors import Predictor, PredictorParameters
 from robot_formation.koopman.predictors.aggregation import ExponentialWeights, MlPoly
 from robot_formation.koopman.predictors.filter_bank import FilterBank, conditioned
