@@ -50,8 +50,8 @@ class DisplacementLog:
         source: the file or bag, for messages.
         places: (n,) where each row stands in the source: "line 2", "timestep 1".
         displacements: (n, 3) net displacement of each timestep.
-        residuals: (n, 3) what the camera saw left at the end, desired minus actual; NaN where unknown, in its last column
-            where only the heading is.
+        residuals: (n, 3) what the camera saw left at the end, desired minus actual; NaN where unknown, in its last
+            column where only the heading is.
         commanded: (n, 3) what the displacement would have been had the prediction move gone as commanded; NaN where
             unknown.
     """

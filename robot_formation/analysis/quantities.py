@@ -222,7 +222,7 @@ def prediction_coverage(follower: FollowerRecord) -> float | None:
 
 
 def prediction_turn_coverage(follower: FollowerRecord) -> float | None:
-    """Share of the counted timesteps whose ideal turn lies in the prediction's 90 % interval; None if there are none."""
+    """Share of the counted timesteps whose ideal turn lies in the prediction's 90 % interval; None without any."""
     inside = []
     for displacement, residual, prediction in _forecast_timesteps(follower):
         if residual.turn_rad is None or prediction.turn_rad is None or prediction.turn_variance <= 0.0:

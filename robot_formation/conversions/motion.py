@@ -117,8 +117,8 @@ def displacement(
         motion: the displacement.
         frame: whose it is in.
         stamp_ns: simulated time at which it is a fact.
-        covariance: of (x, y, yaw), or only of (x, y), row by row [m^2, m rad, rad^2]; a negative variance of x says that
-            there is no estimate, a negative one of yaw that the turn isn't known.
+        covariance: of (x, y, yaw), or only of (x, y), row by row [m^2, m rad, rad^2]; a negative variance of x says
+            that there is no estimate, a negative one of yaw that the turn isn't known.
     """
     message = PoseWithCovarianceStamped(header=header(stamp_ns, frame))
     _set_planar(message.pose.pose, motion)

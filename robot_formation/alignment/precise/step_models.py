@@ -30,6 +30,8 @@ _TURN_SCALE = 0.3
 """Bound on the factor by which the standard deviation of a forecast turn counts."""
 _FIRST_ASIDE_SHARE = 0.5
 """Error of the first step's way aside, share of what its turn leads aside: nothing has been seen of its slip yet."""
+_LEAST_TURN_RAD = 0.02
+"""A forecast turn below this counts as none: it is made of errors of the follower's own heading."""
 _TURNING_RAD, _SURE_ASIDE_M = 0.03, 0.008
 """Turn from which on the way aside of a step ahead is the forecast's, and the most that this may be unsure."""
 _MOST_COST = 9.0
@@ -91,7 +93,7 @@ class Drives:
 
 @dataclass(frozen=True)
 class StepModel:
-    """The neighbour's step in its own frame, the covariance (3, 3) of (x, y, yaw), and whether slip is in it already."""
+    """The neighbour's step in its own frame, covariance (3, 3) of (x, y, yaw), and whether slip is in it already."""
 
     step: Motion
     covariance: Matrix
@@ -130,6 +132,8 @@ class StepModels:
             first: whether it is the first step, which is known beforehand.
         """
         p, mean = self._p, step.mean
+        if abs(mean.yaw_rad) < _LEAST_TURN_RAD:
+            mean = Motion(mean.x_m, mean.y_m)
         aside_m = _FIRST_SIDESTEP_SIGMA_M if own.count == 0 else p.aside_sigma_m * inflation
         turned = self._turned(mean)
         least = turned + _diagonal(p.length_sigma_m, aside_m, p.turn_sigma_rad)
