@@ -24,6 +24,8 @@ from robot_formation.parameters import ParameterError
 from robot_formation.surface import plate_size
 
 STRAIGHT = "straight"
+_LONGEST_V_M, _LONGEST_U_M, _TOUCH_M = 0.15, 0.1, 0.007
+"""Longest prediction moves on a path that isn't straight, and how near of the bodies' gap along u: 7.5 cm of 8.2."""
 _WALK = "random_walk"
 
 KNOWN_STEP: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
@@ -60,6 +62,18 @@ def known_step(
         for name, (part, most) in KNOWN_STEP[kind].items()
         if name not in settings
     }
+
+
+def prediction_bounds(leader: LeaderParameters, distance_m: float, world: WorldNodeParameters) -> dict[str, float]:
+    """Return the fine-tuner's bounds of prediction moves for a path; those of straight ones are its defaults.
+
+    A sideways step that is cut loses the residual that it was to take out too; one as long as the bodies' gap would
+    push a neighbour that stands still.
+    """
+    if leader.path == STRAIGHT:
+        return {}
+    gap_m = distance_m - world.chassis.width_m - _TOUCH_M
+    return {"max_v_m": _LONGEST_V_M, "max_u_m": min(max(gap_m, 0.0), _LONGEST_U_M)}
 
 
 def path_start(

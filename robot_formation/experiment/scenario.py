@@ -22,7 +22,14 @@ from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.experiment.path_check import PathCheck
-from robot_formation.experiment.path_plan import KNOWN_STEP, STRAIGHT, known_step, path_start, with_room
+from robot_formation.experiment.path_plan import (
+    KNOWN_STEP,
+    STRAIGHT,
+    known_step,
+    path_start,
+    prediction_bounds,
+    with_room,
+)
 from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
@@ -221,6 +228,8 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
     world = made(WorldNodeParameters, "world", **_starts(setup, distance_m))
     own = settings.get("overhead_tracker", {})
     known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
+    bounds = prediction_bounds(leader, distance_m, ground)
+    bounds = {name: value for name, value in bounds.items() if name not in settings.get("fine_tuner", {})}
     first = {kind: known_step(kind, leader, 1, distance_m, settings.get(kind, {})) for kind in KNOWN_STEP}
     return Scenario(
         setup,
@@ -231,7 +240,9 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         made(DriveParameters, "drive"),
         made(BlockDetectorNodeParameters, "block_detector"),
         made(PredictorParameters, "predictor", **first["predictor"]),
-        made(FineTunerNodeParameters, "fine_tuner", blackouts=setup.flat_blackouts, **first["fine_tuner"]),
+        made(
+            FineTunerNodeParameters, "fine_tuner", blackouts=setup.flat_blackouts, **first["fine_tuner"], **bounds
+        ),
         with_room(leader, world, setup.followers, distance_m),
     )
 

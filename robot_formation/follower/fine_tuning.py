@@ -76,10 +76,18 @@ class FineTunerParameters:
     )
     # The bodies are 8 cm apart in a formation of 32 cm: a wild forecast must not push the neighbour.
     max_v_m: float = parameter(
-        0.15, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2
+        0.1,
+        "Longest prediction move along v; longer ones are cut. A scenario raises it where the path isn't straight",
+        unit="m",
+        low=0.0,
+        high=0.2,
     )
     max_u_m: float = parameter(
-        0.075, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
+        0.05,
+        "Longest prediction move along u; longer ones are cut. A scenario raises it to the bodies' gap likewise",
+        unit="m",
+        low=0.0,
+        high=0.1,
     )
     max_turn_rad: float = parameter(
         0.35, "Largest turn of the prediction move; larger ones are cut", unit="rad", low=0.0, high=1.0

@@ -28,9 +28,15 @@ class LeaderParameters:
     )
     path: str = parameter("straight", "Name of the path (see 'formation list paths')", known=tuple(PATHS))
     path_parameters: tuple[str, ...] = parameter((), "The path's own parameters, each as 'name=value'")
-    seed: int = parameter(0, "Seed of the path: its phase where none is given, a random walk's steps", low=0)
+    seed: int = parameter(
+        0, "Seed of the path: its phase where none is given, a random walk's steps", low=0, high=2**63 - 1
+    )
     room_m: tuple[float, ...] = parameter(
-        (), "How far a random walk may go from the start: ahead, back, left, right; empty: anywhere", unit="m", low=0.0
+        (),
+        "How far a random walk may go from the start: ahead, back, left, right; empty: anywhere",
+        unit="m",
+        low=0.0,
+        high=1000.0,
     )
     followers: tuple[str, ...] = parameter(("follower_1",), "Robots whose done ticks are waited for")
 

@@ -103,6 +103,13 @@ def test_a_straight_leaders_followers_know_its_step_as_ever() -> None:
     assert override(TRACK, ["leader.step_m=0.03"]).fine_tuner.first_step_m == 0.03
 
 
+def test_prediction_moves_may_be_longer_where_the_path_is_not_straight() -> None:
+    assert (TRACK.fine_tuner.max_v_m, TRACK.fine_tuner.max_u_m) == (0.1, 0.05)
+    tuner = scenario("circle").fine_tuner
+    assert (tuner.max_v_m, tuner.max_u_m) == pytest.approx((0.15, 0.32 - 0.238 - 0.007))
+    assert scenario("circle", "fine_tuner.max_u_m=0.03").fine_tuner.max_u_m == 0.03
+
+
 # --- refusals ---------------------------------------------------------------------------------------------------------
 
 
