@@ -1,10 +1,9 @@
 """A log of displacements, one row per timestep, and its form as a CSV file. Bags give one too: see `from_bag`.
 
 The file's first line names the columns: `u_m` and `v_m`, and where they are known `residual_u_m`, `residual_v_m`,
-`commanded_u_m` and `commanded_v_m`, metres, u to the right and v forward. Each of these pairs may have its turn beside
-it: `turn_rad`, `residual_turn_rad`, `commanded_turn_rad`, anticlockwise. Other columns are ignored, and so are empty
-lines and lines that begin with '#'. All cells of a residual or a command may be empty: it is unknown in that timestep.
-An empty `residual_turn_rad` beside a known residual says that the heading is unknown.
+`commanded_u_m` and `commanded_v_m`, metres, u to the right and v forward. Other columns are ignored, and so are empty
+lines and lines that begin with '#'. Both cells of a residual or a command may be empty: it is unknown in that timestep. A column
+`turn_rad` holds the displacement's turn, anticlockwise.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,15 +21,16 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.errors import shown
-from robot_formation.koopman.predictors.spatial import after
 from robot_formation.parameters import suggestion
 from robot_formation.system.files import read_file
 
-DISPLACEMENT, RESIDUAL, COMMANDED = (
-    (f"{prefix}u_m", f"{prefix}v_m", f"{prefix}turn_rad") for prefix in ("", "residual_", "commanded_")
-)
-_MOTIONS = (DISPLACEMENT, RESIDUAL, COMMANDED)
-_COLUMNS = tuple(name for motion in _MOTIONS for name in motion)
+DISPLACEMENT, RESIDUAL, COMMANDED = ((f"{prefix}u_m", f"{prefix}v_m") for prefix in ("", "residual_", "commanded_"))
+_PAIRS = (DISPLACEMENT, RESIDUAL, COMMANDED)
+TURN = "turn_rad"
+COLUMNS = (*(name for pair in _PAIRS for name in pair), TURN)
+"""Names of all columns that a log may have."""
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+"""Units of length that a log may be in, and their lengths in metres."""
 # What `float` takes beyond this (underscores, other alphabets' digits) is a slip in a log.
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
@@ -42,25 +42,26 @@ _MOST_CHARACTERS = 20_000  # of a line
 
 @dataclass(frozen=True)
 class DisplacementLog:
-    """Displacements of one robot, (u, v, turn) in metres and radians.
-
-    Where a file or an older run tells no turns they are 0, but for the residuals': those are NaN, unknown.
+    """Displacements of one robot, (u, v) in metres.
 
     Attributes:
         source: the file or bag, for messages.
         places: (n,) where each row stands in the source: "line 2", "timestep 1".
-        displacements: (n, 3) net displacement of each timestep.
-        residuals: (n, 3) what the camera saw left at the end, desired minus actual; NaN where unknown, in its last
-            column where only the heading is.
-        commanded: (n, 3) what the displacement would have been had the prediction move gone as commanded; NaN where
+        displacements_m: (n, 2) net displacement of each timestep.
+        residuals_m: (n, 2) what the camera saw left at the end, desired minus actual; NaN where unknown.
+        commanded_m: (n, 2) what the displacement would have been had the prediction move gone as commanded; NaN where
             unknown.
+        turns_rad: (n,) turn of each timestep, anticlockwise; zero where the log has none.
+        skipped: what was wrong with the rows that were left out, for messages.
     """
 
     source: str
     places: tuple[str, ...]
-    displacements: NDArray[np.float64]
-    residuals: NDArray[np.float64]
-    commanded: NDArray[np.float64]
+    displacements_m: NDArray[np.float64]
+    residuals_m: NDArray[np.float64]
+    commanded_m: NDArray[np.float64]
+    turns_rad: NDArray[np.float64]
+    skipped: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.places)
@@ -68,33 +69,33 @@ class DisplacementLog:
     @property
     def has_residuals(self) -> bool:
         """Whether a residual is known in any timestep."""
-        return bool(np.isfinite(self.residuals).any())
-
-    @property
-    def has_turns(self) -> bool:
-        """Whether a turn is told in any timestep."""
-        found = np.stack([self.displacements, self.residuals, self.commanded])[..., 2]
-        return bool(np.nan_to_num(found).any())
+        return bool(np.isfinite(self.residuals_m).any())
 
     @property
     def has_commanded(self) -> bool:
         """Whether a command is known in any timestep."""
-        return bool(np.isfinite(self.commanded).any())
+        return bool(np.isfinite(self.commanded_m).any())
 
     @property
-    def targets(self) -> NDArray[np.float64]:
-        """What forecasts are compared with, (n, 3).
+    def targets_m(self) -> NDArray[np.float64]:
+        """What forecasts are compared with, (n, 2).
 
-        The ideal move (displacement, then residual), NaN where the residual is unknown; the displacement itself if the
+        The ideal move (displacement plus residual), NaN where the residual is unknown; the displacement itself if the
         log has no residuals.
         """
-        if not self.has_residuals:
-            return self.displacements
-        return np.array([after(x, r) for x, r in zip(self.displacements, self.residuals, strict=True)])
+        return self.displacements_m + self.residuals_m if self.has_residuals else self.displacements_m
 
 
-def read_log(path: str | Path) -> DisplacementLog:
+def read_log(
+    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", skip_bad: bool = False
+) -> DisplacementLog:
     """Read a log from a CSV file: UTF-8, separated by commas, with a header.
+
+    Args:
+        path: the file.
+        columns: what the file calls some of `COLUMNS`.
+        unit: of lengths in the file, one of `UNITS`.
+        skip_bad: leave bad rows out instead of refusing the file.
 
     Raises:
         AnalysisError: the file can't be read, a column is missing or twice there, or a row is bad; the text names the
@@ -104,22 +105,46 @@ def read_log(path: str | Path) -> DisplacementLog:
     header = next(lines, None)
     if header is None:
         raise AnalysisError(f"{path} is empty; its first line has to name the columns, like u_m,v_m")
-    columns = _columns(f"{path}, line {header[0]}", header[1])
+    found = _columns(f"{path}, line {header[0]}", _renamed(f"{path}, line {header[0]}", header[1], columns or {}))
     width = len(header[1])
     places: list[str] = []
     rows: list[list[float]] = []
+    skipped: list[str] = []
     for number, cells in lines:
-        where = f"{path}, line {number}"
-        if len(cells) != width:
-            raise AnalysisError(f"{where}: the header names {width} columns, the row has {len(cells)}; correct the row")
         if len(rows) == _MOST_ROWS:
-            raise AnalysisError(f"{where}: a log holds up to {_MOST_ROWS} timesteps; split the file")
-        rows.append([value for motion in _MOTIONS for value in _motion(where, motion, columns, cells)])
+            raise AnalysisError(f"{path}, line {number}: a log holds up to {_MOST_ROWS} timesteps; split the file")
+        try:
+            rows.append(_row(f"{path}, line {number}", cells, width, found))
+        except AnalysisError as error:
+            if not skip_bad:
+                raise
+            skipped.append(str(error))
+            continue
         places.append(f"line {number}")
     if not rows:
-        raise AnalysisError(f"{path} has a header but no rows; add one row per timestep")
+        raise AnalysisError(f"{path} has a header but no {'good ' if skipped else ''}rows; add one row per timestep")
     values = np.array(rows)
-    return DisplacementLog(str(path), tuple(places), values[:, 0:3], values[:, 3:6], values[:, 6:9])
+    lengths = values[:, :6] * UNITS[unit]
+    return DisplacementLog(
+        str(path), tuple(places), lengths[:, 0:2], lengths[:, 2:4], lengths[:, 4:6], values[:, 6], tuple(skipped)
+    )
+
+
+def _row(where: str, cells: Sequence[str], width: int, columns: dict[str, int]) -> list[float]:
+    """Read (u, v) of displacement, residual and command, and the turn."""
+    if len(cells) != width:
+        raise AnalysisError(f"{where}: the header names {width} columns, the row has {len(cells)}; correct the row")
+    values = [value for pair in _PAIRS for value in _pair(where, pair, columns, cells)]
+    return [*values, _number(where, TURN, cells[columns[TURN]]) if TURN in columns else 0.0]
+
+
+def _renamed(where: str, header: Sequence[str], columns: Mapping[str, str]) -> list[str]:
+    """Return the header with our names instead of the file's."""
+    ours = {theirs: name for name, theirs in columns.items()}
+    for theirs in ours:
+        if theirs not in header:
+            raise AnalysisError(f"{where}: no column '{theirs[:_SHOWN]}' in the header{suggestion(theirs, header)}")
+    return [ours.get(name, f"other {name}" if name in columns else name) for name in header]
 
 
 def write_log(log: DisplacementLog, path: str | Path) -> None:
@@ -128,11 +153,10 @@ def write_log(log: DisplacementLog, path: str | Path) -> None:
     Raises:
         AnalysisError: the file exists already, or can't be written.
     """
-    arrays: list[tuple[tuple[str, ...], NDArray[np.float64]]] = [(DISPLACEMENT, log.displacements)]
-    arrays += [(RESIDUAL, log.residuals)] if log.has_residuals else []
-    arrays += [(COMMANDED, log.commanded)] if log.has_commanded else []
-    if not log.has_turns:
-        arrays = [(names[:2], values[:, :2]) for names, values in arrays]
+    arrays: list[tuple[tuple[str, ...], NDArray[np.float64]]] = [(DISPLACEMENT, log.displacements_m)]
+    arrays += [(RESIDUAL, log.residuals_m)] if log.has_residuals else []
+    arrays += [(COMMANDED, log.commanded_m)] if log.has_commanded else []
+    arrays += [((TURN,), log.turns_rad[:, None])] if log.turns_rad.any() else []
     rows = np.hstack([values for _, values in arrays]).tolist()
     try:
         with Path(path).open("x", encoding="utf-8", newline="") as file:
@@ -170,28 +194,26 @@ def _columns(where: str, header: Sequence[str]) -> dict[str, int]:
     others = [mark for mark in (";", "\t") if any(mark in cell for cell in header)]
     if others:
         raise AnalysisError(f"{where}: columns are separated by {shown(others[0])}; separate them by commas")
-    for name in _COLUMNS:
+    for name in COLUMNS:
         if header.count(name) > 1:
             raise AnalysisError(f"{where}: column '{name}' is there {header.count(name)} times; leave one")
-    for motion in _MOTIONS:
-        missing = [name for name in motion[:2] if name not in header]
-        if missing and (motion is DISPLACEMENT or len(missing) == 1 or motion[2] in header):
-            hint = suggestion(missing[0], [cell[:_SHOWN] for cell in header if cell not in _COLUMNS])
+    for pair in _PAIRS:
+        missing = [name for name in pair if name not in header]
+        if missing and (pair is DISPLACEMENT or len(missing) == 1):
+            hint = suggestion(missing[0], [cell[:_SHOWN] for cell in header if cell not in COLUMNS])
             raise AnalysisError(f"{where}: no column '{missing[0]}' in the header{hint}")
-    return {name: header.index(name) for name in _COLUMNS if name in header}
+    return {name: header.index(name) for name in COLUMNS if name in header}
 
 
-def _motion(where: str, names: tuple[str, ...], columns: dict[str, int], cells: Sequence[str]) -> tuple[float, ...]:
-    """Read u, v and turn; all NaN where they are unknown and may be."""
+def _pair(where: str, names: tuple[str, str], columns: dict[str, int], cells: Sequence[str]) -> tuple[float, float]:
+    """Read u and v; both NaN where they are unknown and may be."""
     if names[0] not in columns:
-        return math.nan, math.nan, math.nan
-    texts = [cells[columns[name]] if name in columns else "" for name in names]
+        return math.nan, math.nan
+    texts = [cells[columns[name]] for name in names]
     if names != DISPLACEMENT and not any(texts):
-        return math.nan, math.nan, math.nan
-    u_m, v_m = (_number(where, name, text) for name, text in zip(names[:2], texts[:2], strict=True))
-    if names[2] not in columns or (names is RESIDUAL and not texts[2]):
-        return u_m, v_m, math.nan if names is RESIDUAL else 0.0
-    return u_m, v_m, _number(where, names[2], texts[2])
+        return math.nan, math.nan
+    u_m, v_m = (_number(where, name, text) for name, text in zip(names, texts, strict=True))
+    return u_m, v_m
 
 
 def _number(where: str, name: str, text: str) -> float:
@@ -204,6 +226,4 @@ def _number(where: str, name: str, text: str) -> float:
         raise AnalysisError(
             f"{where}: {name} is {text[:_SHOWN]!r}, which is not finite; correct it or leave the row out"
         )
-    raise AnalysisError(
-        f"{where}: {name} is {text[:_SHOWN]!r}, which is no number; write metres, or radians of a turn, like 0.05"
-    )
+    raise AnalysisError(f"{where}: {name} is {text[:_SHOWN]!r}, which is no number; write metres like 0.05")

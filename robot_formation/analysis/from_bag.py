@@ -114,23 +114,15 @@ def load_displacements(path: str | Path, robot: str, namespace: str | None = Non
             messages[message.topic].append(message.message)
     if not messages[names.DISPLACEMENT.of(robot)]:
         raise AnalysisError(f"{path} has no displacements of '{robot}'; give the bag of a run with finished timesteps")
-    residual = names.RESIDUAL.of(robot)
-    by_stamp = [
-        {entry.stamp_ns: entry for entry in (_with_known_turns(found) if topic == residual else found)}
-        for topic in topics
-        for found in (_stamped(messages[topic]),)
-    ]
+    by_stamp = [{entry.stamp_ns: entry.motion for entry in _stamped(messages[topic])} for topic in topics]
     stamps = sorted(by_stamp[0])
-    columns = [
-        np.array([_uv_turn(found[stamp]) if stamp in found else (math.nan,) * 3 for stamp in stamps])
+    displacements, residuals, commanded = (
+        np.array([(found[stamp].u_m, found[stamp].v_m) if stamp in found else (math.nan, math.nan) for stamp in stamps])
         for found in by_stamp
-    ]
-    return DisplacementLog(str(path), tuple(f"timestep {t}" for t in range(1, len(stamps) + 1)), *columns)
-
-
-def _uv_turn(entry: Stamped) -> tuple[float, float, float]:
-    turn = entry.turn_rad
-    return entry.motion.u_m, entry.motion.v_m, math.nan if turn is None else turn
+    )
+    turns_rad = np.array([by_stamp[0][stamp].yaw_rad for stamp in stamps])
+    places = tuple(f"timestep {t}" for t in range(1, len(stamps) + 1))
+    return DisplacementLog(str(path), places, displacements, residuals, commanded, turns_rad)
 
 
 def _require_displacements(bag: FormationBag, robot: str) -> None:

@@ -240,9 +240,7 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         made(DriveParameters, "drive"),
         made(BlockDetectorNodeParameters, "block_detector"),
         made(PredictorParameters, "predictor", **first["predictor"]),
-        made(
-            FineTunerNodeParameters, "fine_tuner", blackouts=setup.flat_blackouts, **first["fine_tuner"], **bounds
-        ),
+        made(FineTunerNodeParameters, "fine_tuner", blackouts=setup.flat_blackouts, **first["fine_tuner"], **bounds),
         with_room(leader, world, setup.followers, distance_m),
     )
 

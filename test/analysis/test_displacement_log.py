@@ -34,31 +34,23 @@ def file(tmp_path: Path) -> Callable[[str | bytes], Path]:
 def log_of(
     displacements: ArrayLike, residuals: ArrayLike | None = None, commanded: ArrayLike | None = None
 ) -> DisplacementLog:
-    moved = with_turn(displacements, 0.0)
-    unknown = np.full_like(moved, np.nan)
-    places = tuple(f"line {t + 2}" for t in range(len(moved)))
+    displacements = np.array(displacements, dtype=float)
+    unknown = np.full_like(displacements, np.nan)
+    places = tuple(f"line {t + 2}" for t in range(len(displacements)))
     return DisplacementLog(
         "log.csv",
         places,
-        moved,
-        unknown if residuals is None else with_turn(residuals, np.nan),
-        unknown if commanded is None else with_turn(commanded, 0.0),
+        displacements,
+        unknown if residuals is None else np.array(residuals, dtype=float),
+        unknown if commanded is None else np.array(commanded, dtype=float),
+        np.zeros(len(displacements)),
     )
-
-
-def with_turn(values: ArrayLike, turn_rad: float) -> NDArray[np.float64]:
-    """Add the turn to rows that have none; a row that is unknown is so as a whole."""
-    rows = np.array(values, dtype=float)
-    if rows.shape[1] == 3:
-        return rows
-    turns = np.where(np.isnan(rows).any(axis=1), np.nan, turn_rad)
-    return np.hstack([rows, turns[:, None]])
 
 
 def test_a_log_of_displacements_alone_has_them_for_targets(file: Callable[[str | bytes], Path]) -> None:
     log = read_log(file("u_m,v_m\n0.01,0.05\n-0.02,5e-2\n"))
-    np.testing.assert_array_equal(log.displacements, [[0.01, 0.05, 0.0], [-0.02, 0.05, 0.0]])
-    np.testing.assert_array_equal(log.targets, log.displacements)
+    np.testing.assert_array_equal(log.displacements_m, [[0.01, 0.05], [-0.02, 0.05]])
+    np.testing.assert_array_equal(log.targets_m, log.displacements_m)
     assert log.places == ("line 2", "line 3")
     assert not log.has_residuals
     assert not log.has_commanded
@@ -66,23 +58,8 @@ def test_a_log_of_displacements_alone_has_them_for_targets(file: Callable[[str |
 
 def test_with_residuals_the_target_is_the_ideal_move(file: Callable[[str | bytes], Path]) -> None:
     log = read_log(file(f"{FULL}\n0.01,0.05,0.001,-0.002,0.02,0.06\n0.02,0.05,,,,\n"))
-    np.testing.assert_allclose(log.targets[:, :2], [[0.011, 0.048], [np.nan, np.nan]], rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(log.commanded, [[0.02, 0.06, 0.0], [np.nan] * 3])
-
-
-def test_turns_are_read_where_the_file_has_them_and_turn_the_residual(file: Callable[[str | bytes], Path]) -> None:
-    header = "u_m,v_m,turn_rad,residual_u_m,residual_v_m,residual_turn_rad"
-    log = read_log(file(f"{header}\n0.01,0.05,{math.pi / 2},0.002,0.001,0.1\n0.01,0.05,0.2,0.002,0.001,\n"))
-    assert log.has_turns
-    # A quarter turn to the left: what is right of the robot then lay ahead before, and what is ahead lay left.
-    np.testing.assert_allclose(log.targets[0], [0.009, 0.052, math.pi / 2 + 0.1], rtol=0, atol=1e-15)
-    assert np.isnan(log.targets[1, 2])
-    assert np.isfinite(log.targets[1, :2]).all()
-
-
-def test_a_turn_without_its_displacement_is_refused(file: Callable[[str | bytes], Path]) -> None:
-    with pytest.raises(AnalysisError, match="no column 'residual_u_m'"):
-        read_log(file("u_m,v_m,residual_turn_rad\n0.01,0.05,0.1\n"))
+    np.testing.assert_allclose(log.targets_m, [[0.011, 0.048], [np.nan, np.nan]], rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(log.commanded_m, [[0.02, 0.06], [np.nan, np.nan]])
 
 
 @pytest.mark.parametrize(
@@ -100,7 +77,7 @@ def test_a_turn_without_its_displacement_is_refused(file: Callable[[str | bytes]
 )
 def test_what_is_harmless_is_read(file: Callable[[str | bytes], Path], content: str) -> None:
     log = read_log(file(content))
-    np.testing.assert_array_equal(log.displacements, [[0.01, 0.05, 0.0]])
+    np.testing.assert_array_equal(log.displacements_m, [[0.01, 0.05]])
 
 
 @pytest.mark.parametrize(
@@ -161,13 +138,13 @@ def test_whatever_is_in_a_file_it_is_read_or_refused(tmp_path_factory: pytest.Te
         log = read_log(path)
     except AnalysisError:
         return
-    assert np.isfinite(log.displacements).all()
+    assert np.isfinite(log.displacements_m).all()
 
 
-ROWS = arrays(float, st.tuples(st.integers(1, 8), st.sampled_from([2, 3])), elements=st.floats(-1.0, 1.0))
+PAIRS = arrays(float, st.tuples(st.integers(1, 8), st.just(2)), elements=st.floats(-1.0, 1.0))
 
 
-@given(ROWS, st.booleans(), st.booleans())
+@given(PAIRS, st.booleans(), st.booleans())
 def test_what_was_written_is_read_back_to_the_last_bit(
     tmp_path_factory: pytest.TempPathFactory, values: NDArray[np.float64], residuals: bool, commanded: bool
 ) -> None:
@@ -177,9 +154,8 @@ def test_what_was_written_is_read_back_to_the_last_bit(
     path = tmp_path_factory.mktemp("log") / "log.csv"
     write_log(log, path)
     back = read_log(path)
-    columns = 3 if log.has_turns else 2
-    for name in ("displacements", "residuals", "commanded"):
-        np.testing.assert_array_equal(getattr(back, name)[:, :columns], getattr(log, name)[:, :columns])
+    for name in ("displacements_m", "residuals_m", "commanded_m"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(log, name))
 
 
 def test_a_log_is_never_written_over_another_file(tmp_path: Path) -> None:
@@ -200,7 +176,7 @@ def test_previous_forecasts_the_row_before() -> None:
     log = log_of(wandering(12))
     forecasts = forecast_log(log, PredictorParameters(name="previous"))
     assert np.isnan(forecasts.means_m[0]).all()
-    np.testing.assert_array_equal(forecasts.means_m[1:], log.displacements[:-1, :2])
+    np.testing.assert_array_equal(forecasts.means_m[1:], log.displacements_m[:-1])
 
 
 def test_literal_forecasts_powers_of_the_first_fit_whatever_follows() -> None:

@@ -56,8 +56,8 @@ def test_a_run_below_a_namespace_is_found_and_gives_the_same_figures(
 ) -> None:
     bag = moved_to("/site_a")
     assert to_json(analyse(load_run(bag))) == to_json(analyse(load_run(SAMPLE)))
-    assert load_displacements(bag, "follower_1").displacements == pytest.approx(
-        load_displacements(SAMPLE, "follower_1").displacements, abs=0.0
+    assert load_displacements(bag, "follower_1").displacements_m == pytest.approx(
+        load_displacements(SAMPLE, "follower_1").displacements_m, abs=0.0
     )
     ours, theirs = (printed(capsys, "replay", path, "--json")["followers"] for path in (bag, SAMPLE))
     assert ours == theirs

@@ -88,8 +88,8 @@ class FilterBank:
                 gains = covariances[:, :, j] * (known[:, j] / variances)[:, None]
                 means = means + gains * innovations[:, None]
                 covariances = covariances - gains[:, :, None] * covariances[:, j, None, :]
-                misfit = (NU + 1.0) * np.log1p(innovations**2 / (NU * variances)) + np.log(variances)
-                losses = losses + np.where(known[:, j], misfit, 0.0)
+                newest = (NU + 1.0) * np.log1p(innovations**2 / (NU * variances)) + np.log(variances)
+                losses = losses + np.where(known[:, j], newest, 0.0)
             self._losses = losses
         self.means = np.einsum("bij,bj->bi", m.onward, means)
         covariances = m.onward @ covariances @ self._onward_turned + m.noise

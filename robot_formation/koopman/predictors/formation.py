@@ -20,16 +20,23 @@ from robot_formation.koopman.predictors.closing import ActuationBias
 from robot_formation.koopman.predictors.experts import BankExpert, DmdExpert, Expert
 from robot_formation.koopman.predictors.horizon import MOST_STEPS
 from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Vector, vector
-from robot_formation.koopman.predictors.oscillators import Known, joined, oscillators, periods_of, trends, turning
+from robot_formation.koopman.predictors.oscillators import (
+    PriorKnowledge,
+    joined,
+    oscillators,
+    periods_of,
+    trends,
+    turning,
+)
 from robot_formation.koopman.predictors.parameters import EdmdParameters, PredictorParameters
 from robot_formation.koopman.predictors.spatial import rotated
 
 AXES = ("u", "v", "turn")
 # Displacements are all there is where no residual was ever seen: so finely are they taken as they are.
 _EXACT = np.array([1e-4, 1e-4, 1e-3]) ** 2
-# How much each expert is believed at first.
+# How much each expert is believed at first, one by one; persistence gets its weight from 'initial_loss'.
 _PRIORS = {
-    "persistence": 8.0,
+    "persistence": 1.0,
     "trends": 1.0,
     "oscillators": 2.0,
     "overtones": 1.0,
@@ -40,19 +47,20 @@ _PRIORS = {
 }
 
 
-class Formation:
+class MixedExperts:
     """Experts of residual and leader-induced displacement, aggregated per axis; and the actuation bias."""
 
     def __init__(self, parameters: PredictorParameters, chosen: Sequence[str] = tuple(_PRIORS)) -> None:
         p = parameters.formation
         closing = self._closing = parameters.closing
-        known = Known(closing)
+        known = PriorKnowledge(closing)
         self._camera = known.camera
         self._bounds = np.array([parameters.max_u_m, parameters.max_v_m, parameters.max_turn_rad])
         self._periods = periods_of(p.oscillators)
         self._parameters, self._chosen = parameters, chosen
         self.experts = _experts(parameters, known, chosen)
-        prior = np.array([_PRIORS[name] for name in chosen])
+        first = {**_PRIORS, "persistence": math.exp(p.initial_loss)}
+        prior = np.array([first[name] for name in chosen])
         self._coupling = p.coupling
         self._aggregations: list[Aggregation] = []
         self._speak: list[NDArray[np.int64]] = []
@@ -100,7 +108,7 @@ class Formation:
 
     def _begin_with(self, displacement: Vector) -> None:
         """Forget what was known beforehand of the leader's step: this log has no residuals, and may be of anything."""
-        known = Known(self._closing)
+        known = PriorKnowledge(self._closing)
         known.step, known.step_sigma = displacement, np.sqrt(_EXACT)
         self.experts = _experts(self._parameters, known, self._chosen)
         self._estimate()
@@ -227,7 +235,7 @@ class Formation:
         self._estimate()
 
 
-def _experts(parameters: PredictorParameters, known: Known, chosen: Sequence[str]) -> dict[str, Expert]:
+def _experts(parameters: PredictorParameters, known: PriorKnowledge, chosen: Sequence[str]) -> dict[str, Expert]:
     """Make the experts by name; persistence comes first, since others take its filtered displacements."""
     closing, p = parameters.closing, parameters.formation
     levels = [
@@ -258,7 +266,7 @@ def _experts(parameters: PredictorParameters, known: Known, chosen: Sequence[str
             return BankExpert(turning(known, o, signed, level=False), o.discount)
         if name == "dmd":
             return DmdExpert(EdmdParameters(dictionary="identity", prior=1e-3), persistence)
-        delays = p.edmd if name == "delays 3" else EdmdParameters(dictionary="constant identity delay:6", prior=1.0)
+        delays = p.edmd if name == "delays 3" else EdmdParameters(dictionary="constant delay:6", prior=1.0)
         return DmdExpert(delays, persistence)
 
     return {name: made(name) for name in chosen}

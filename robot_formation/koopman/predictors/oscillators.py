@@ -17,7 +17,7 @@ from robot_formation.koopman.predictors.filter_bank import BankModel, conditione
 from robot_formation.koopman.predictors.parameters import ClosingParameters, OscillatorParameters
 
 
-class Known:
+class PriorKnowledge:
     """What is known before timestep 1, per axis (u, v, turn), from the parameters of the closing.
 
     Attributes:
@@ -35,7 +35,7 @@ class Known:
         self.camera = np.array([p.residual_u_m, p.residual_v_m, p.residual_turn_rad]) ** 2
 
 
-def trends(known: Known, axis: int, settings: Iterable[tuple[float, float, float, float, float]]) -> BankModel:
+def trends(known: PriorKnowledge, axis: int, settings: Iterable[tuple[float, float, float, float, float]]) -> BankModel:
     """Make filters (r, level, trend) of an axis from (noise, level, trend, damping, first trend) of each."""
     rows = list(settings)
     scale = known.scale[axis]
@@ -59,7 +59,7 @@ def trends(known: Known, axis: int, settings: Iterable[tuple[float, float, float
 
 
 def oscillators(
-    known: Known, axis: int, p: OscillatorParameters, periods: NDArray[np.float64], harmonics: int
+    known: PriorKnowledge, axis: int, p: OscillatorParameters, periods: NDArray[np.float64], harmonics: int
 ) -> BankModel:
     """Make filters (r, level, c_1, s_1, ...) of an axis: a level and oscillations of these periods and overtones."""
     size, count, scale = 2 + 2 * harmonics, len(periods), known.scale[axis]
@@ -85,7 +85,7 @@ def oscillators(
     )
 
 
-def turning(known: Known, p: OscillatorParameters, periods: NDArray[np.float64], *, level: bool) -> BankModel:
+def turning(known: PriorKnowledge, p: OscillatorParameters, periods: NDArray[np.float64], *, level: bool) -> BankModel:
     """Make filters of u and v together: a displacement whose direction turns evenly, beside a constant one or none.
 
     The period's sign is the direction of rotation. State (r_u, r_v, z_u, z_v, level_u, level_v); eigenvalues

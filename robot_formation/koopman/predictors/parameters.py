@@ -171,6 +171,12 @@ class FormationParameters:
         choices=("exponential", "ml_poly"),
     )
     discount: float = parameter(0.9, "Weight of a past error relative to the next newer one", low=0.01, high=1.0)
+    initial_loss: float = parameter(
+        2.0,
+        "How much other experts are behind persistence at first (logarithm of the weights' ratio)",
+        low=0.0,
+        high=100.0,
+    )
     coupling: float = parameter(
         0.3, "Share of the error along u that counts along v, and the other way round", low=0.0, high=1.0
     )
@@ -189,7 +195,7 @@ class FormationParameters:
     trend_start_m: float = parameter(
         0.002, "Trend filters: standard deviation of the trend at first", unit="m", low=0.0, high=1.0
     )
-    edmd: EdmdParameters = EdmdParameters(dictionary="constant identity delay:3", prior=0.05)
+    edmd: EdmdParameters = EdmdParameters(dictionary="constant delay:3", prior=0.05)
     oscillators: OscillatorParameters = OscillatorParameters()
 
     def __post_init__(self) -> None:

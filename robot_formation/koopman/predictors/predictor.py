@@ -17,7 +17,7 @@ from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.linear_algebra import KoopmanError
 from robot_formation.koopman.predictors.closing import Closing
 from robot_formation.koopman.predictors.dmd import Edmd, Literal, Measured
-from robot_formation.koopman.predictors.formation import Formation
+from robot_formation.koopman.predictors.formation import MixedExperts
 from robot_formation.koopman.predictors.horizon import MOST_STEPS, Ahead, HorizonErrors
 from robot_formation.koopman.predictors.models import (
     Diagnostics,
@@ -110,9 +110,9 @@ class Predictor:
         if name not in NAMES:
             raise PredictionError(f"no predictor '{name}'{suggestion(name, NAMES)}")
         inner = name.removesuffix(CLOSE)
-        self._closing: Closing | Formation | None = None
+        self._closing: Closing | MixedExperts | None = None
         if name in EXPERTS:
-            self._closing = Formation(parameters, EXPERTS[name])
+            self._closing = MixedExperts(parameters, EXPERTS[name])
         else:
             self._model = Spatial(MODELS[inner](parameters), TURN_MODELS.get(inner, Previous)(parameters, 1))
             if name.endswith(CLOSE):

@@ -12,7 +12,7 @@ from predictor_helpers import predictor
 from robot_formation.koopman.predictors import Predictor, PredictorParameters
 from robot_formation.koopman.predictors.aggregation import ExponentialWeights, MlPoly
 from robot_formation.koopman.predictors.filter_bank import FilterBank, conditioned
-from robot_formation.koopman.predictors.oscillators import Known, oscillators, periods_of, trends, turning
+from robot_formation.koopman.predictors.oscillators import PriorKnowledge, oscillators, periods_of, trends, turning
 from robot_formation.koopman.predictors.parameters import ClosingParameters, OscillatorParameters
 
 Array = npt.NDArray[np.float64]
@@ -42,7 +42,7 @@ def test_an_oscillator_of_the_right_period_continues_its_sequence(harmonics: int
     w = 0.03 + 0.02 * np.cos(2.0 * math.pi * t / period + 0.4)
     if harmonics == 2:
         w += 0.01 * np.sin(4.0 * math.pi * t / period)
-    known = Known(ClosingParameters(step_v_m=float(w[0])))
+    known = PriorKnowledge(ClosingParameters(step_v_m=float(w[0])))
     bank = FilterBank(oscillators(known, 1, p, np.array([period]), harmonics), 0.95, 10)
     for value in w[:40]:
         bank.observe(np.array([0.0, value, 0.0]), np.zeros(3), EXACT)
@@ -51,7 +51,7 @@ def test_an_oscillator_of_the_right_period_continues_its_sequence(harmonics: int
 
 def test_a_turning_displacement_is_continued_after_two_timesteps() -> None:
     w = circle(20, -9.0)
-    known = Known(ClosingParameters(step_v_m=0.05))
+    known = PriorKnowledge(ClosingParameters(step_v_m=0.05))
     bank = FilterBank(turning(known, OscillatorParameters(), np.array([9.0, -9.0]), level=False), 0.95, 10)
     for value in w[:2]:
         bank.observe(value, np.zeros(3), EXACT)
@@ -65,25 +65,25 @@ def test_the_eigenvalues_of_oscillators_lie_on_the_unit_circle() -> None:
     periods = periods_of(p)
     assert (periods[0], periods[-1], len(periods)) == (pytest.approx(p.longest), pytest.approx(p.shortest), p.count)
     for model in (
-        oscillators(Known(ClosingParameters()), 0, p, periods, 2),
-        turning(Known(ClosingParameters()), p, periods, level=True),
+        oscillators(PriorKnowledge(ClosingParameters()), 0, p, periods, 2),
+        turning(PriorKnowledge(ClosingParameters()), p, periods, level=True),
     ):
         assert np.abs(np.linalg.eigvals(model.onward)) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_the_likelihood_finds_the_period() -> None:
-    p, known = OscillatorParameters(), Known(ClosingParameters(step_v_m=0.05))
+    p, known = OscillatorParameters(), PriorKnowledge(ClosingParameters(step_v_m=0.05))
     periods = periods_of(p)
     bank = FilterBank(oscillators(known, 1, p, periods, 1), p.discount, 10)
     rng = np.random.default_rng(1)
     for value in pulse(50, 14.0):
         seen = np.array([0.0, rng.normal(0.0, 0.001), 0.0])
-        bank.observe(value + [0.0, rng.normal(0.0, 0.0015), 0.0], seen, known.camera)
+        bank.observe(value + np.array([0.0, rng.normal(0.0, 0.0015), 0.0]), seen, known.camera)
     assert periods[np.argmin(bank.losses)] == pytest.approx(14.0, rel=0.05)
 
 
 def test_what_nobody_saw_leaves_the_weights_and_moves_the_mean_by_the_model() -> None:
-    p, known = OscillatorParameters(), Known(ClosingParameters())
+    p, known = OscillatorParameters(), PriorKnowledge(ClosingParameters())
     bank = FilterBank(trends(known, 1, [(0.0016, 0.0003, 0.002, 1.0, 0.002)]), 0.9, 10)
     for value in pulse(12, 14.0):
         bank.observe(value, np.zeros(3), known.camera)
@@ -158,7 +158,7 @@ def test_exponential_weights_go_to_the_best_expert_and_leave_one_that_fails() ->
 
 
 def follow(found: Predictor, w: Array, seed: int = 0, blind: tuple[int, ...] = ()) -> Array:
-    """Errors (n, 3) of the forecasts along a leader's steps (n, 3), by a follower that obeys them; noise as in a run."""
+    """Errors (n, 3) of the forecasts along a leader's steps (n, 3) of a follower that obeys them."""
     rng, r, errors = np.random.default_rng(seed), np.zeros(3), np.full((len(w), 3), np.nan)
     command = w[0]
     for t, step in enumerate(w):
