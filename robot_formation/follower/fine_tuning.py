@@ -131,8 +131,8 @@ class RequestFrames:
 
 @dataclass(frozen=True)
 class Report:
-    """The timestep's net displacement, what is left by the camera's estimate (None: Target face not seen, or blind), and
-    what the displacement would have been had the prediction move gone as commanded (None: its end is unknown).
+    """The timestep's net displacement, what is left by the camera's estimate (None: Target face not seen, or blind),
+    and what the displacement would have been had the prediction move gone as commanded (None: its end is unknown).
     """
 
     displacement: Motion

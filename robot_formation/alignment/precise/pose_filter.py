@@ -237,7 +237,7 @@ class PoseFilter:
                 stepped = Hypothesis(hypothesis.state.copy(), hypothesis.covariance, cost, number)
                 self._step(stepped, model, own, tilt_rad)
                 found.append(stepped)
-        self.hypotheses = found
+        self.hypotheses = sorted(found, key=lambda h: h.cost)
 
     @property
     def _inflation(self) -> float:
