@@ -78,7 +78,7 @@ class StepParameters:
         0.03, "Way of such a step beside the forecast, standard deviation", unit="m", low=0.0, high=1.0
     )
     change_sigma_rad: float = parameter(
-        0.1, "Turn of such a step beside the forecast, standard deviation", unit="rad", low=0.0, high=1.0
+        0.03, "Turn of such a step beside the forecast, standard deviation", unit="rad", low=0.0, high=1.0
     )
 
 
