@@ -109,7 +109,7 @@ def test_a_displacement_without_an_estimate_is_left_out_and_answered_from_what_i
 
 def test_a_displacement_that_is_not_finite_is_warned_of_at_once(wire: Wire) -> None:
     wire.give("displacement", report(Motion(math.inf, 0.0), 2)[0])
-    assert "displacement: (-0.0, inf) m is not finite" in wire.warnings[0]
+    assert "displacement: (-0.0, inf) m, 0.0 rad is not finite" in wire.warnings[0]
 
 
 @pytest.mark.parametrize("topic", [0, 1])
