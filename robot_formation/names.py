@@ -178,6 +178,7 @@ DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStampe
 RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
 COMMANDED = Topic("commanded", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
 PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("fine_tuner",))
+FORECAST = Topic("forecast", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("fine_tuner",))
 ALIGNMENT = Topic("alignment", "std_msgs/msg/String", HISTORY)
 # Made of ground truth and robot descriptions: by the world where tf2_msgs is installed (it is not on pip), else by the
 # recorder. In the formation's namespace, since formations have frames of the same names.

@@ -28,6 +28,9 @@ LIST_ELEMENTS: dict[object, type] = {
 }
 """Types of parameters that are lists, and of what."""
 
+PAIRS = tuple[tuple[int, int], ...]
+"""Type of parameters that are lists of pairs of whole numbers; only scenarios have such, ROS has none."""
+
 _LONGEST_NAME = 100
 _LISTED = 240  # characters
 _EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
@@ -48,6 +51,9 @@ class ParameterError(FormationError):
 FORMER_NAMES = {
     "formation.handicap": "formation.initial_loss",
     "precise.filter.calm_misfit": "precise.filter.calm_nis",
+    "precise.filter.neighbour_sidestep_sigma_m": "precise.filter.step.aside_sigma_m",
+    "precise.filter.neighbour_step_sigma_m": "precise.filter.step.length_sigma_m",
+    "precise.filter.neighbour_turn_sigma_rad": "precise.filter.step.turn_sigma_rad",
     "precise.filter.slip_per_lean": "precise.filter.slip_per_tilt",
 }
 """Names that parameters had before and today's: the value means the same, so that the former name is still taken."""
@@ -80,7 +86,7 @@ class Spec:
 
     def plain_default(self) -> Any:
         """Return the default as YAML, ROS and JSON hold it: a list for a tuple."""
-        return list(self.default) if isinstance(self.default, tuple) else self.default
+        return _plain_list(self.default) if isinstance(self.default, tuple) else self.default
 
 
 def parameter(
@@ -138,6 +144,10 @@ def _plain(value: object) -> object:
     return value.value if isinstance(value, Choice) else value
 
 
+def _plain_list(values: tuple[object, ...]) -> list[object]:
+    return [list(value) if isinstance(value, tuple) else value for value in values]
+
+
 def todays_names(values: Mapping[str, T], *, where: str = "parameters") -> dict[str, T]:
     """Return parameters under their present names: values by dotted names, of which some may be former ones.
 
@@ -189,7 +199,7 @@ def to_mapping(instance: Any, prefix: str = "") -> dict[str, Any]:
         if dataclasses.is_dataclass(value):
             values.update(to_mapping(value, f"{prefix}{field.name}."))
         else:
-            values[prefix + field.name] = list(value) if isinstance(value, tuple) else _plain(value)
+            values[prefix + field.name] = _plain_list(value) if isinstance(value, tuple) else _plain(value)
     return values
 
 
@@ -279,6 +289,8 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     Raises:
         ParameterError: on a wrong type, or a value outside the range or the choices.
     """
+    if spec.type == PAIRS:
+        return _check_pairs(spec, value, subject)
     if spec.type in LIST_ELEMENTS:
         if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
             raise ParameterError(f"{subject} must be a list, not {shown(value)}")
@@ -291,6 +303,16 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
         raise TypeError(f"{spec.name}: optional parameters are not supported; use a neutral default")
     checked = _check_one(spec, typing.cast(type, kind), _plain(value), subject)
     return spec.choice(checked) if spec.choice else checked
+
+
+def _check_pairs(spec: Spec, value: object, subject: str) -> object:
+    wrong = ParameterError(f"{subject} must be a list of pairs like [[12, 3]], not {shown(value)}")
+    if not isinstance(value, (list, tuple)):
+        raise wrong
+    for pair in value:
+        if not isinstance(pair, (list, tuple)) or len(pair) != 2:
+            raise wrong
+    return tuple(tuple(_check_one(spec, int, item, subject) for item in pair) for pair in value)
 
 
 def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,13 +15,13 @@ import numpy as np
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.uncertain_motion import covariance_xy
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
+from robot_formation.koopman.predictors.models import Vector
 from robot_formation.names import Message
 from robot_formation.system.files import MOST_RECORD_BYTES, read_file
 
 _MOST_UNPAIRED = 16  # timesteps of which not all parts have come: in a run, one at a time
-# (u, v) to (x, y) = (v, -u): how a covariance of the paper's axes becomes one of REP-103.
-_TO_XY = np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
 class PredictorComponent(Component):
@@ -71,7 +73,7 @@ class PredictorComponent(Component):
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
-        return [names.PREDICTION]
+        return [names.FORECAST, names.PREDICTION]
 
     def details(self) -> dict[str, str]:
         """See `Component`."""
@@ -117,17 +119,19 @@ class PredictorComponent(Component):
         self._answer(stamp_ns)
 
     def _read(self, topic: names.Topic, message: Message) -> Any:
-        """Read (u, v, 0) of a displacement [m], None where there is no estimate."""
+        """Read (u, v, turn) of a displacement [m, rad], None where there is no estimate; NaN for a turn not known."""
         if not conversions.has_estimate(message):
             if topic == names.DISPLACEMENT:
                 self.warn("a displacement without an estimate is left out")
             return None
         motion = conversions.read_displacement(message)
-        found = np.array([motion.u_m, motion.v_m, 0.0])
-        if not np.isfinite(found).all():
-            self.warn(f"{topic.name}: ({motion.u_m}, {motion.v_m}) m is not finite; it is left out")
+        if not motion.finite:
+            self.warn(
+                f"{topic.name}: ({motion.u_m}, {motion.v_m}) m, {motion.yaw_rad} rad is not finite; it is left out"
+            )
             return None
-        return found
+        unknown = topic == names.RESIDUAL and not conversions.knows_turn(message)
+        return np.array([motion.u_m, motion.v_m, math.nan if unknown else motion.yaw_rad])
 
     def _answer(self, stamp_ns: int) -> None:
         """Predict once all parts of the timestep are here, in whatever order they came.
@@ -154,13 +158,19 @@ class PredictorComponent(Component):
             forecast = self.predictor.predict()
         except PredictionError as error:
             self.warn(f"{error}; answering with no motion")
-            self._send_prediction(Motion(), conversions.NO_ESTIMATE)
+            self._send_answer(names.PREDICTION, Motion(), conversions.NO_ESTIMATE)
             return
-        covariance = _TO_XY @ forecast.about_command[:2, :2] @ _TO_XY.T
         self._save()  # before the answer: whoever has it finds the state that goes with it
-        u_m, v_m, _ = forecast.command.tolist()
-        self._send_prediction(Motion.from_uv(u_m, v_m), covariance.ravel().tolist())
+        # The fine-tuner waits for the prediction, so what it may use beside it goes first.
+        covariance = covariance_xy(forecast.covariance)
+        self._send_answer(names.FORECAST, _motion(self._predictor.step(parts[names.RESIDUAL])), covariance)
+        self._send_answer(names.PREDICTION, _motion(forecast.command), covariance_xy(forecast.about_command))
 
-    def _send_prediction(self, mean: Motion, covariance: Sequence[float]) -> None:
+    def _send_answer(self, topic: names.Topic, mean: Motion, covariance: Sequence[float]) -> None:
         base = self.place.frame(names.BASE_FRAME)
-        self._send(names.PREDICTION, conversions.displacement(mean, base, self.stamp_ns, covariance))
+        self._send(topic, conversions.displacement(mean, base, self.stamp_ns, covariance))
+
+
+def _motion(found: Vector) -> Motion:
+    u_m, v_m, turn_rad = found.tolist()
+    return replace(Motion.from_uv(u_m, v_m), yaw_rad=turn_rad)

@@ -38,7 +38,7 @@ KNOWN_STEP: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
         "predictor": {
             "closing.step_v_m": ("v", 1.0),
             "closing.step_u_m": ("u", 1.0),
-            "closing.step_turn_rad": ("turn", 1.1),
+            "closing.step_turn_rad": ("turn", 3.2),
         },
     }
 )

@@ -110,6 +110,7 @@ def _by_stamp(messages: list[Message]) -> dict[int, Message]:
 
 
 def _estimate(message: Message) -> Motion | None:
+    """Read a motion; None if there is no estimate."""
     if message is None or not conversions.has_estimate(message):
         return None
     return conversions.read_displacement(message)
@@ -119,8 +120,7 @@ def _ideal(displacement: Message, residual: Message) -> Motion | None:
     left = _estimate(residual)
     if left is None:
         return None
-    moved = conversions.read_displacement(displacement)
-    return Motion(moved.x_m + left.x_m, moved.y_m + left.y_m)
+    return conversions.read_displacement(displacement).then(left)
 
 
 @dataclass(frozen=True)

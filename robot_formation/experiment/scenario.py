@@ -30,9 +30,11 @@ from robot_formation.experiment.path_plan import (
     prediction_bounds,
     with_room,
 )
+from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.parameters import (
+    PAIRS,
     ParameterError,
     check_as,
     flatten,
@@ -65,7 +67,7 @@ FOLLOWS_FROM_SETUP = {
     },
     "block_detector": {"sensor": "'marker'"},
     "leader": {"followers": "'followers'", "seed": "'seed'", "room_m": "the plate's size"},
-    "fine_tuner": {"done_listeners": "'followers'"},
+    "fine_tuner": {"done_listeners": "'followers'", "blackouts": "'blackouts' of the scenario"},
 }
 """Parameters of nodes that follow from the setup, and what is set instead."""
 
@@ -84,6 +86,18 @@ class Setup:
     start_y_m: float = parameter(0.158, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
     heading_deg: float = parameter(90.0, "Heading of the formation", unit="deg", low=-360.0, high=360.0)
     marker: MarkerKind = parameter(MarkerKind.COLOURS, "What the robots' markers carry and their cameras look for")
+    blackouts: PAIRS = parameter(
+        (), "Timesteps without cameras: pairs of first timestep and length, like [[12, 3]]", low=1, high=1000000
+    )
+
+    def __post_init__(self) -> None:
+        """Check that blackouts don't overlap."""
+        blind_timesteps(self.flat_blackouts, "'blackouts'")
+
+    @property
+    def flat_blackouts(self) -> tuple[int, ...]:
+        """The blackouts' numbers one after another, as the fine-tuner has them."""
+        return tuple(number for pair in self.blackouts for number in pair)
 
 
 @dataclass(frozen=True)
@@ -147,6 +161,12 @@ class Scenario:
         Raises:
             FormationError: naming what is wrong.
         """
+        last = max(blind_timesteps(self.setup.flat_blackouts), default=0)
+        if last > self.leader.timesteps:
+            raise ParameterError(
+                f"'blackouts' last until timestep {last}, but the run has only {self.leader.timesteps} timesteps; "
+                "shorten them or raise 'leader.timesteps'"
+            )
         fastest = self.world.motor.max_speed_rad_s
         if self.drive.wheel_speed_rad_s > fastest:
             raise ParameterError(
@@ -220,7 +240,7 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         made(DriveParameters, "drive"),
         made(BlockDetectorNodeParameters, "block_detector"),
         made(PredictorParameters, "predictor", **first["predictor"]),
-        made(FineTunerNodeParameters, "fine_tuner", **first["fine_tuner"], **bounds),
+        made(FineTunerNodeParameters, "fine_tuner", blackouts=setup.flat_blackouts, **first["fine_tuner"], **bounds),
         with_room(leader, world, setup.followers, distance_m),
     )
 

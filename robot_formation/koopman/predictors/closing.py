@@ -244,6 +244,10 @@ class Closing:
             found[0] = after(residual, found[0])
         return found
 
+    def step(self) -> Vector:
+        """Forecast what the leader will induce next (3,), in the frame of the place where no residual is left."""
+        return np.asarray(self._model.ahead(1)[0])
+
     def bias(self) -> Vector:
         """By how much the robot is expected to go farther than it is told, (3,)."""
         return self._bias.forecast()

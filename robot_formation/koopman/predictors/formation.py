@@ -157,12 +157,20 @@ class MixedExperts:
 
     def ahead(self, steps: int) -> Matrix:
         """Forecast the next displacements (steps, 3): the next ideal move, then what follows if nothing is left."""
-        found = self._mixed(self._steps[:, :steps] if steps <= MOST_STEPS else self._ahead(steps))
-        if not self._seen[2]:
-            found[:, 2] = self._last_turn
+        found = self._induced(steps)
         residual = self.residual
         found[0, :2] = rotated(found[0, :2], float(residual[2]))
         found[0] += residual
+        return found
+
+    def step(self) -> Vector:
+        """Forecast what the leader will induce next (3,), in the frame of the place where no residual is left."""
+        return np.asarray(self._induced(1)[0])
+
+    def _induced(self, steps: int) -> Matrix:
+        found = self._mixed(self._steps[:, :steps] if steps <= MOST_STEPS else self._ahead(steps))
+        if not self._seen[2]:
+            found[:, 2] = self._last_turn
         return found
 
     def bias(self) -> Vector:

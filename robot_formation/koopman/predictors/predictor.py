@@ -33,7 +33,7 @@ from robot_formation.koopman.predictors.models import (
     vector,
 )
 from robot_formation.koopman.predictors.parameters import CLOSABLE, NAMES, TREND_CLOSE, PredictorParameters
-from robot_formation.koopman.predictors.spatial import Spatial, after, ways
+from robot_formation.koopman.predictors.spatial import Spatial, after, between, ways
 from robot_formation.parameters import suggestion
 
 # Nothing moves or is measured so finely: what is less is rounding, and dividing by it makes no sense.
@@ -184,6 +184,20 @@ class Predictor:
         mean = self._expected.copy()
         command = mean.copy() if self._closing is None else self._bounded(mean - self._closing.bias())
         return Forecast(mean, self._errors / self._weight, command)
+
+    def step(self, residual: Vector | None) -> Vector:
+        """Forecast what the leader will induce in the next timestep (3,), in the frame of the place without residual.
+
+        Args:
+            residual: the latest (3,), its turn may be NaN; None if unknown. Used where the predictor estimates none.
+
+        Raises:
+            PredictionError: before the first observation.
+        """
+        mean = self.predict().mean
+        if self._closing is not None:
+            return self._bounded(self._closing.step())
+        return mean if residual is None else between(np.nan_to_num(residual), mean)
 
     def ahead(self, steps: int) -> list[Ahead]:
         """Forecast the next timesteps, 1 to `steps`.

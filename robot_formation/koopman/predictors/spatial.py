@@ -28,6 +28,11 @@ def after(first: Vector, second: Vector) -> Vector:
     return np.append(rotated(second[:2], float(first[2])) + first[:2], second[2] + first[2])
 
 
+def between(before: Vector, now: Vector) -> Vector:
+    """Return the motion (3,) that leads from one pose to another, in the frame of the first."""
+    return np.append(rotated(now[:2] - before[:2], -float(before[2])), now[2] - before[2])
+
+
 def ways(steps: Matrix) -> Matrix:
     """Compose motions (n, 3), each in the frame in which the one before ends; return all the sums, (n, 3)."""
     found = np.empty_like(steps)
