@@ -163,7 +163,7 @@ class PredictorComponent(Component):
         self._save()  # before the answer: whoever has it finds the state that goes with it
         # The fine-tuner waits for the prediction, so what it may use beside it goes first.
         covariance = covariance_xy(forecast.covariance)
-        self._send_answer(names.FORECAST, _motion(self._predictor.step(parts[names.RESIDUAL])), covariance)
+        self._send_answer(names.FORECAST, _motion(self.predictor.step(parts[names.RESIDUAL])), covariance)
         self._send_answer(names.PREDICTION, _motion(forecast.command), covariance_xy(forecast.about_command))
 
     def _send_answer(self, topic: names.Topic, mean: Motion, covariance: Sequence[float]) -> None:

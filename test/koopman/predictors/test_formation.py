@@ -9,7 +9,7 @@ import pytest
 
 from cases import case
 from predictor_helpers import predictor
-from robot_formation.koopman.predictors import Predictor, PredictorParameters
+from robot_formation.koopman.predictors import Ahead, Predictor, PredictorParameters
 from robot_formation.koopman.predictors.aggregation import ExponentialWeights, MlPoly
 from robot_formation.koopman.predictors.filter_bank import FilterBank, conditioned
 from robot_formation.koopman.predictors.oscillators import PriorKnowledge, oscillators, periods_of, trends, turning
@@ -118,7 +118,7 @@ def losses_of(aggregation: MlPoly | ExponentialWeights, forecasts: Array, values
 def sequences(count: int) -> dict[str, tuple[Array, Array]]:
     """Experts' forecasts (count, 3) and values (count,), in units of the scale."""
     rng, t = np.random.default_rng(4), np.arange(count)
-    signs = (-1.0) ** t
+    signs: Array = np.where(t % 2, -1.0, 1.0)
     best = rng.integers(0, 3, count // 20 + 1).repeat(20)[:count]
     return {
         "one is right": (np.tile([0.0, 1.0, -2.0], (count, 1)) + rng.normal(0.0, 0.1, (count, 3)), np.zeros(count)),
@@ -255,7 +255,8 @@ def test_the_ellipse_of_several_steps_holds_the_truth_about_as_often_as_it_says(
     for seed in range(3):
         found, r = predictor("formation"), np.zeros(3)
         w = circle(45, 13.0) + np.random.default_rng(seed + 50).normal(0.0, (0.001, 0.0015, 0.0), (45, 3))
-        command, ways = w[0], []
+        command = w[0]
+        ways: list[tuple[int, Array, list[Ahead]]] = []
         rng = np.random.default_rng(seed)
         for t, step in enumerate(w):
             ideal = r + step
