@@ -80,6 +80,12 @@ class StepParameters:
     change_sigma_rad: float = parameter(
         0.03, "Turn of such a step beside the forecast, standard deviation", unit="rad", low=0.0, high=1.0
     )
+    bend_cost: float = parameter(
+        4.0, "-2 log likelihood of a step on an arc of another radius than forecast, beforehand", low=0.0, high=100.0
+    )
+    bend_sigma_rad: float = parameter(
+        0.05, "Turn of such a step beside the forecast, standard deviation", unit="rad", low=0.0, high=1.0
+    )
 
 
 @dataclass(frozen=True)
@@ -114,7 +120,7 @@ class StepModels:
         self._p = p = parameters
         self._least_leg_m = least_leg_m
         self._wheel_lever_m = wheel_lever_m
-        self._before = [0.0, *(p.forecast_cost for _ in p.scales), p.change_cost]
+        self._before = [0.0, *(p.forecast_cost for _ in p.scales), p.change_cost, p.bend_cost]
         self._seen = [0.0] * len(self._before)
 
     @property
@@ -123,7 +129,7 @@ class StepModels:
         return [before + seen for before, seen in zip(self._before, self._seen, strict=True)]
 
     def models(self, step: UncertainMotion, own: Drives, inflation: float, first: bool) -> list[StepModel]:
-        """List the models of a step: ahead on an arc, by forecast with several covariances, and a change.
+        """List the models of a step: ahead on an arc, by forecast with several covariances, a change, and another arc.
 
         Args:
             step: the forecast in the neighbour's frame.
@@ -144,10 +150,13 @@ class StepModels:
         # In turns the way aside has many parts: the predictor has seen their sum, where it is sure of it.
         turning = abs(mean.yaw_rad) > _TURNING_RAD and step.matrix[1, 1] < _SURE_ASIDE_M**2
         floor = turned + _diagonal(p.length_sigma_m, max(aside_m, p.forecast_aside_sigma_m), p.turn_sigma_rad)
+        ahead = mean if turning else self._driven(arc, own)
+        bend = np.array([0.0, 0.5 * mean.x_m, 1.0]) * p.bend_sigma_rad
         return [
-            StepModel(mean if turning else self._driven(arc, own), least, turning),
+            StepModel(ahead, least, turning),
             *(StepModel(mean, floor + _scaled(step.matrix, scale), True) for scale in p.scales),
             StepModel(mean, step.matrix + _diagonal(p.change_sigma_m, p.change_sigma_m, p.change_sigma_rad), True),
+            StepModel(ahead, least + np.outer(bend, bend), turning),
         ]
 
     def _driven(self, step: Motion, own: Drives) -> Motion:
