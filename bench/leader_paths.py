@@ -1,13 +1,13 @@
 """Predictors on leaders of many paths: what is left for the camera to correct, per path and per phase of the run.
 
 Each run is one path, surface, predictor and seed: 60 timesteps in process, camera on demand, fine-tuner in mode paper
-unless --set says otherwise. The plate is 2.6 m wide, so that no path leaves it. The table OUT/runs.csv grows row by
-row, and the same command goes on where it was stopped. `report` prints what the table says: medians over seeds, and
-paired ratios with 95 % bootstrap intervals. `figure` draws the medians.
+unless --set says otherwise. The leader keeps its heading, since mode paper follows no turns; the plate is 2.6 m wide,
+so that no path leaves it. The table OUT/runs.csv grows row by row, and the same command goes on where it was stopped.
+`report` prints what the table says: medians over seeds, and paired ratios with 95 % bootstrap intervals. `figure` draws
+the medians.
 
 Phases are timesteps 5 to 10, 11 to 30, and 31 to the end. Errors of prediction: ideal way over h timesteps minus
-forecast, by showing the run's own log to its predictor once more. Coverage: share of them in the forecast's 90 %
-ellipse. Half of the weight: the first timestep from which on the Koopman models of `formation` have half of the weight
+forecast. Coverage: share of them in the forecast's 90 % ellipse. Half of the weight: the first timestep from which on the Koopman models of `formation` have half of the weight
 along v for five timesteps.
 
     python bench/leader_paths.py run OUT --seeds 0:20 [--paths circle12,slalom8] [--surfaces bowl]
@@ -63,8 +63,8 @@ PATHS: dict[str, tuple[str, ...]] = {
     "pulse20": ("pulse", "step_m=0.03", "period=20"),
     "lemniscate": ("lemniscate",),
     "lissajous": ("lissajous",),
-    "stadium": ("stadium",),
-    "clothoid": ("clothoid", "step_m=0.03"),
+    "stadium": ("stadium", "heading=kept"),
+    "clothoid": ("clothoid", "step_m=0.03", "heading=kept"),
     "random_walk": ("random_walk",),
     "switch": ("switch",),
 }
@@ -393,7 +393,7 @@ def figure(args: argparse.Namespace) -> int:
     runs = grouped(list(open_table(args.out).read()))
     surfaces = list(dict.fromkeys(surface for _, surface in runs))
     paths = [name for name in PATHS if any(path == name for path, _ in runs)]
-    sheet = new_figure(4.2 * len(surfaces) + 1.0, 0.42 * len(paths) + 1.8)
+    sheet = new_figure(4.2 * len(surfaces) + 2.0, 0.36 * len(paths) + 1.8)
     panels = np.atleast_1d(sheet.subplots(1, len(surfaces), sharey=True))
     handles: dict[str, object] = {}
     for panel, surface in zip(panels, surfaces, strict=True):
@@ -424,7 +424,7 @@ def figure(args: argparse.Namespace) -> int:
         panel.set_axisbelow(True)
     panels[0].set_yticks(range(len(paths)), paths)
     panels[0].invert_yaxis()
-    legend_below(sheet, list(handles.values()), len(handles))
+    legend_below(sheet, list(handles.values()), 3 if len(surfaces) == 1 else len(handles))
     save_figure(sheet, args.file)
     print(args.file)
     return 0
