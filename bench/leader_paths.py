@@ -7,8 +7,8 @@ so that no path leaves it. The table OUT/runs.csv grows row by row, and the same
 the medians.
 
 Phases are timesteps 5 to 10, 11 to 30, and 31 to the end. Errors of prediction: ideal way over h timesteps minus
-forecast. Coverage: share of them in the forecast's 90 % ellipse. Half of the weight: the first timestep from which on the Koopman models of `formation` have half of the weight
-along v for five timesteps.
+forecast. Coverage: share of them in the forecast's 90 % ellipse. Half of the weight: the first timestep from which on
+the Koopman models of `formation` have half of the weight along v for five timesteps.
 
     python bench/leader_paths.py run OUT --seeds 0:20 [--paths circle12,slalom8] [--surfaces bowl]
     python bench/leader_paths.py report OUT
