@@ -84,7 +84,7 @@ def forecast_log(log: DisplacementLog, parameters: PredictorParameters, horizon:
                 f"{log.source}, {place}: {error}; correct it (metres), or raise predictor.max_u_m and max_v_m"
             ) from error
     statistics = error_statistics(log.targets_m - means, covariances)
-    horizons = tuple({"h": float(h), **_way_statistics(log, ahead, h)} for h in range(1, horizon + 1))
+    horizons = tuple({"h": h, **_way_statistics(log, ahead, h)} for h in range(1, horizon + 1))
     return OneStepForecasts(
         parameters.name, means, covariances, statistics, horizons, model_of(predictor.diagnostics())
     )
