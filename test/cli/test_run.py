@@ -207,6 +207,7 @@ def test_json_of_a_run_that_left_nothing_to_analyse_says_what_it_was_to_be_and_w
         "totals": None,
         "seed": 5,
         "predictor": "formation",
+        "path": "straight",
         "surface": "plane",
         "conditions": {
             "mode": "precise",
