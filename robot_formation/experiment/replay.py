@@ -94,7 +94,7 @@ def _replay_predictor(recording: Recording, robot: str, parameters: Any) -> Pred
             take[names.COMMANDED.name](command)
         take[names.DISPLACEMENT.name](displacement)
         take[names.RESIDUAL.name](residual)
-    today = [message for _, message in sent]
+    today = [message for topic, message in sent if topic == names.PREDICTION.name]
     before, after = _by_stamp(recorded), _by_stamp(today)
     rows = []
     for number, displacement in enumerate(displacements):
