@@ -158,7 +158,8 @@ class PredictorComponent(Component):
             forecast = self.predictor.predict()
         except PredictionError as error:
             self.warn(f"{error}; answering with no motion")
-            self._send_answer(names.PREDICTION, Motion(), conversions.NO_ESTIMATE)
+            for topic in (names.FORECAST, names.PREDICTION):  # the fine-tuner waits for both
+                self._send_answer(topic, Motion(), conversions.NO_ESTIMATE)
             return
         self._save()  # before the answer: whoever has it finds the state that goes with it
         # The fine-tuner waits for the prediction, so what it may use beside it goes first.
