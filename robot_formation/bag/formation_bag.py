@@ -20,7 +20,6 @@ _OF_FOLLOWERS = (
     names.RESIDUAL,
     names.COMMANDED,
     names.PREDICTION,
-    names.FORECAST,
     names.ALIGNMENT,
     names.BLOCKS,
     names.camera_image(),

@@ -114,11 +114,9 @@ def _changed(commanded: Message, change: Motion) -> Message:
     if not conversions.has_estimate(commanded):
         return commanded
     motion = conversions.read_displacement(commanded)
-    changed = Motion(motion.x_m + change.x_m, motion.y_m + change.y_m, motion.yaw_rad)
+    changed = Motion(motion.x_m + change.x_m, motion.y_m + change.y_m)
     stamp_ns = conversions.stamp_of(commanded)
-    return conversions.displacement(
-        changed, commanded.header.frame_id, stamp_ns, conversions.read_covariance(commanded)
-    )
+    return conversions.displacement(changed, commanded.header.frame_id, stamp_ns, (0.0,) * 4)
 
 
 def _pose(message: Message) -> Pose:
