@@ -152,6 +152,8 @@ def test_drive_stop_ends_a_move_and_leader_stop_pauses_the_track(lab: Lab) -> No
     moved = lab.collect(names.MOVED, namespace="/leader")
     joint_states = lab.collect(names.joint_states("leader"))
     moves = lab.publisher(names.MOVE, namespace="/leader")
+    # The world waits for nobody here: what it says of the move is lost on whoever has not found it yet.
+    lab.until(lambda: lab.node.count_publishers("/leader/joint_states"))
     moves.publish(conversions.move(Motion(x_m=0.2), "leader/base_link", 0))
     lab.until(lambda: joint_states)
     assert lab.call("/leader/drive/stop").success
