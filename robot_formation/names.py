@@ -166,6 +166,10 @@ CLOCK_TOPIC = Topic("clock", "rosgraph_msgs/msg/Clock", CLOCK)
 ROS_CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", CLOCK)
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", STATUS)
 MOVE = Topic("move", "geometry_msgs/msg/PoseStamped", listeners=("drive",))
+PLAN = Topic("plan", "nav_msgs/msg/Path", LATCHED)
+# A person's commands come from outside the run, at any rate, and only the newest counts.
+CMD_VEL = Topic("cmd_vel", "geometry_msgs/msg/TwistStamped", Qos(history="keep_last", depth=1))
+CMD_VEL_UNSTAMPED = Topic("cmd_vel_unstamped", "geometry_msgs/msg/Twist", Qos(history="keep_last", depth=1))
 MOVED = Topic("moved", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ())
 ODOM = Topic("odom", "nav_msgs/msg/Odometry")
 BLOCKS = Topic("blocks", "sensor_msgs/msg/PointCloud2", listeners=("fine_tuner",))
@@ -174,6 +178,7 @@ DISPLACEMENT = Topic("displacement", "geometry_msgs/msg/PoseWithCovarianceStampe
 RESIDUAL = Topic("residual", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
 COMMANDED = Topic("commanded", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("predictor",))
 PREDICTION = Topic("prediction", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("fine_tuner",))
+FORECAST = Topic("forecast", "geometry_msgs/msg/PoseWithCovarianceStamped", HISTORY, ("fine_tuner",))
 ALIGNMENT = Topic("alignment", "std_msgs/msg/String", HISTORY)
 # Made of ground truth and robot descriptions: by the world where tf2_msgs is installed (it is not on pip), else by the
 # recorder. In the formation's namespace, since formations have frames of the same names.

@@ -28,6 +28,9 @@ LIST_ELEMENTS: dict[object, type] = {
 }
 """Types of parameters that are lists, and of what."""
 
+PAIRS = tuple[tuple[int, int], ...]
+"""Type of parameters that are lists of pairs of whole numbers; only scenarios have such, ROS has none."""
+
 _LONGEST_NAME = 100
 _LISTED = 240  # characters
 _EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
@@ -48,6 +51,9 @@ class ParameterError(FormationError):
 FORMER_NAMES = {
     "formation.handicap": "formation.initial_loss",
     "precise.filter.calm_misfit": "precise.filter.calm_nis",
+    "precise.filter.neighbour_sidestep_sigma_m": "precise.filter.step.aside_sigma_m",
+    "precise.filter.neighbour_step_sigma_m": "precise.filter.step.length_sigma_m",
+    "precise.filter.neighbour_turn_sigma_rad": "precise.filter.step.turn_sigma_rad",
     "precise.filter.slip_per_lean": "precise.filter.slip_per_tilt",
 }
 """Names that parameters had before and today's: the value means the same, so that the former name is still taken."""
@@ -80,7 +86,7 @@ class Spec:
 
     def plain_default(self) -> Any:
         """Return the default as YAML, ROS and JSON hold it: a list for a tuple."""
-        return list(self.default) if isinstance(self.default, tuple) else self.default
+        return _plain_list(self.default) if isinstance(self.default, tuple) else self.default
 
 
 def parameter(
@@ -138,6 +144,10 @@ def _plain(value: object) -> object:
     return value.value if isinstance(value, Choice) else value
 
 
+def _plain_list(values: tuple[object, ...]) -> list[object]:
+    return [list(value) if isinstance(value, tuple) else value for value in values]
+
+
 def todays_names(values: Mapping[str, T], *, where: str = "parameters") -> dict[str, T]:
     """Return parameters under their present names: values by dotted names, of which some may be former ones.
 
@@ -189,7 +199,7 @@ def to_mapping(instance: Any, prefix: str = "") -> dict[str, Any]:
         if dataclasses.is_dataclass(value):
             values.update(to_mapping(value, f"{prefix}{field.name}."))
         else:
-            values[prefix + field.name] = list(value) if isinstance(value, tuple) else _plain(value)
+            values[prefix + field.name] = _plain_list(value) if isinstance(value, tuple) else _plain(value)
     return values
 
 
@@ -210,6 +220,40 @@ def from_mapping(cls: type[T], values: Mapping[str, object], *, where: str) -> T
         if name not in known:
             raise ParameterError(f"{where}: no parameter '{name}'{suggestion(name, known)}")
     return _build(cls, {name: check(known[name], value, where=where) for name, value in flat.items()})
+
+
+def read_texts(cls: type, texts: Iterable[str], *, where: str, example: str) -> dict[str, Any]:
+    """Read texts like 'size_m=2.0', in which a ROS parameter can hold parameters of a dataclass.
+
+    Args:
+        cls: a frozen dataclass as for `from_mapping`, which checks names, types and ranges.
+        texts: a name and a value each.
+        where: what the parameters belong to, for messages ("surface 'bowl'").
+        example: of such a text, for messages.
+
+    Raises:
+        ParameterError: on a text that is no name and value, a name that comes twice, or a value that is no number where
+            one is needed.
+    """
+    known = specs(cls)
+    values: dict[str, Any] = {}
+    for text in texts:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise ParameterError(f"{where}: its parameters are texts like '{example}', not {shown(text)}")
+        if key in values:
+            raise ParameterError(f"{where}: '{key}' is given twice; keep one of them")
+        kind = known[key].type if key in known else str  # an unknown name is refused as such
+        values[key] = value if kind is str else _number_of(value, kind, f"{where}: '{key}'")
+    return values
+
+
+def _number_of(text: str, kind: object, subject: str) -> object:
+    try:
+        return int(text) if kind is int else float(text)
+    except ValueError:
+        what = "a whole number" if kind is int else "a number"
+        raise ParameterError(f"{subject} needs {what}, not {shown(text)}") from None
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
@@ -245,6 +289,8 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     Raises:
         ParameterError: on a wrong type, or a value outside the range or the choices.
     """
+    if spec.type == PAIRS:
+        return _check_pairs(spec, value, subject)
     if spec.type in LIST_ELEMENTS:
         if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
             raise ParameterError(f"{subject} must be a list, not {shown(value)}")
@@ -257,6 +303,16 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
         raise TypeError(f"{spec.name}: optional parameters are not supported; use a neutral default")
     checked = _check_one(spec, typing.cast(type, kind), _plain(value), subject)
     return spec.choice(checked) if spec.choice else checked
+
+
+def _check_pairs(spec: Spec, value: object, subject: str) -> object:
+    wrong = ParameterError(f"{subject} must be a list of pairs like [[12, 3]], not {shown(value)}")
+    if not isinstance(value, (list, tuple)):
+        raise wrong
+    for pair in value:
+        if not isinstance(pair, (list, tuple)) or len(pair) != 2:
+            raise wrong
+    return tuple(tuple(_check_one(spec, int, item, subject) for item in pair) for pair in value)
 
 
 def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:

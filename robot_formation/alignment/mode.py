@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Protocol
 
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.uncertain_motion import UncertainMotion
 from robot_formation.vision.pixy2.block import Block
 
 Frames = Sequence[Sequence[Block]]
@@ -37,11 +38,17 @@ class Decision:
 class AlignmentMode(Protocol):
     """One follower's use of its camera, over all timesteps."""
 
-    def restart(self, timestep: int) -> None:
-        """Begin a timestep: the neighbour has made its step (timestep 0: nobody has moved yet)."""
+    def restart(self, timestep: int, step: UncertainMotion | None = None) -> None:
+        """Begin a timestep: the neighbour has made its step (timestep 0: nobody has moved yet).
 
-    def turn(self) -> float:
-        """Return the turn [rad] to make with the prediction move."""
+        Args:
+            timestep: its number.
+            step: what that step is expected to do to the formation position, in that position's own frame; None if
+                nothing is.
+        """
+
+    def turn(self, forecast_rad: float) -> float:
+        """Return the turn [rad] to make with the prediction move, of which so much was forecast."""
 
     def moved(self, asked: Motion, motion: Motion) -> None:
         """Process a move: as commanded, and as the encoder wheels measured it."""
@@ -49,5 +56,8 @@ class AlignmentMode(Protocol):
     def assess(self, frames: Frames) -> Decision:
         """Decide what a look calls for."""
 
-    def offset(self) -> Motion | None:
+    def offset(self) -> UncertainMotion | None:
         """Estimate the way to the formation position after the last look; None if the look doesn't tell."""
+
+    def ahead(self) -> UncertainMotion | None:
+        """Estimate that way without a look, by forecast and measured moves; None if nothing is known."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from robot_formation.alignment.mode import Decision, Frames, Verdict
 from robot_formation.alignment.observation import FaceBox, bounding_boxes
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.uncertain_motion import TURN_UNKNOWN, UncertainMotion
 from robot_formation.parameters import ParameterError, parameter
 from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
@@ -167,23 +168,34 @@ class PaperMode:
         self._p = parameters
         self._alignment = PaperAlignment(parameters)
         self._blocks: Sequence[Block] = ()
+        self._way: UncertainMotion | None = None
 
-    def restart(self, timestep: int) -> None:
+    def restart(self, timestep: int, step: UncertainMotion | None = None) -> None:
         """See `AlignmentMode`."""
+        left = self.offset() or self._way
         self._alignment = PaperAlignment(self._p)
+        self._blocks = ()
+        self._way = (left or UncertainMotion(Motion())).then(step) if step is not None else None
 
-    def turn(self) -> float:
-        """See `AlignmentMode`; the rule table leaves the heading alone."""
+    def turn(self, forecast_rad: float) -> float:
+        """See `AlignmentMode`; the rule table leaves the heading alone, so that a forecast turn isn't made either."""
         return 0.0
 
     def moved(self, asked: Motion, motion: Motion) -> None:
         """See `AlignmentMode`; the rule table has no memory of moves."""
+        if self._way is not None:
+            self._way = self._way.after(motion)
 
     def assess(self, frames: Frames) -> Decision:
         """See `AlignmentMode`."""
         self._blocks = frames[-1]
         return self._alignment.assess(self._blocks)
 
-    def offset(self) -> Motion | None:
+    def offset(self) -> UncertainMotion | None:
+        """See `AlignmentMode`; the rule table doesn't know the heading."""
+        offset = self._alignment.offset(self._blocks)
+        return None if offset is None else UncertainMotion(offset, TURN_UNKNOWN)
+
+    def ahead(self) -> UncertainMotion | None:
         """See `AlignmentMode`."""
-        return self._alignment.offset(self._blocks)
+        return self._way

@@ -49,7 +49,7 @@ def _word(found: object) -> str | None:
 
 
 def run_facts(details: Mapping[str, str], *, in_process: bool | None = None) -> JsonObject:
-    """Return which run it was, as the command line's JSON has it: seed, predictor, surface, conditions.
+    """Return which run it was, as the command line's JSON has it: seed, predictor, path, surface, conditions.
 
     Args:
         details: what the run says of itself, as `launching.processes.run_metadata` puts it.
@@ -58,6 +58,7 @@ def run_facts(details: Mapping[str, str], *, in_process: bool | None = None) -> 
     return {
         "seed": whole_number(details, "seed", _SEED_DIGITS),
         "predictor": details.get("predictor"),
+        "path": _word(node_parameters(details).get("leader", {}).get("path", "straight" if details else None)),
         "surface": details.get("surface"),
         "conditions": {**conditions(node_parameters(details)), "in_process": in_process},
     }

@@ -3,6 +3,7 @@
 The file's first line names the columns: `u_m` and `v_m`, and where they are known `residual_u_m`, `residual_v_m`,
 `commanded_u_m` and `commanded_v_m`, metres, u to the right and v forward. Other columns are ignored, and so are empty
 lines and lines that begin with '#'. Both cells of a residual or a command may be empty: it is unknown in that timestep.
+A column `turn_rad` holds the displacement's turn, anticlockwise.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,7 +26,11 @@ from robot_formation.system.files import read_file
 
 DISPLACEMENT, RESIDUAL, COMMANDED = ((f"{prefix}u_m", f"{prefix}v_m") for prefix in ("", "residual_", "commanded_"))
 _PAIRS = (DISPLACEMENT, RESIDUAL, COMMANDED)
-_COLUMNS = tuple(name for pair in _PAIRS for name in pair)
+TURN = "turn_rad"
+COLUMNS = (*(name for pair in _PAIRS for name in pair), TURN)
+"""Names of all columns that a log may have."""
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+"""Units of length that a log may be in, and their lengths in metres."""
 # What `float` takes beyond this (underscores, other alphabets' digits) is a slip in a log.
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
@@ -46,6 +51,8 @@ class DisplacementLog:
         residuals_m: (n, 2) what the camera saw left at the end, desired minus actual; NaN where unknown.
         commanded_m: (n, 2) what the displacement would have been had the prediction move gone as commanded; NaN where
             unknown.
+        turns_rad: (n,) turn of each timestep, anticlockwise; zero where the log has none.
+        skipped: what was wrong with the rows that were left out, for messages.
     """
 
     source: str
@@ -53,6 +60,8 @@ class DisplacementLog:
     displacements_m: NDArray[np.float64]
     residuals_m: NDArray[np.float64]
     commanded_m: NDArray[np.float64]
+    turns_rad: NDArray[np.float64]
+    skipped: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.places)
@@ -77,8 +86,16 @@ class DisplacementLog:
         return self.displacements_m + self.residuals_m if self.has_residuals else self.displacements_m
 
 
-def read_log(path: str | Path) -> DisplacementLog:
+def read_log(
+    path: str | Path, *, columns: Mapping[str, str] | None = None, unit: str = "m", skip_bad: bool = False
+) -> DisplacementLog:
     """Read a log from a CSV file: UTF-8, separated by commas, with a header.
+
+    Args:
+        path: the file.
+        columns: what the file calls some of `COLUMNS`.
+        unit: of lengths in the file, one of `UNITS`.
+        skip_bad: leave bad rows out instead of refusing the file.
 
     Raises:
         AnalysisError: the file can't be read, a column is missing or twice there, or a row is bad; the text names the
@@ -88,22 +105,46 @@ def read_log(path: str | Path) -> DisplacementLog:
     header = next(lines, None)
     if header is None:
         raise AnalysisError(f"{path} is empty; its first line has to name the columns, like u_m,v_m")
-    columns = _columns(f"{path}, line {header[0]}", header[1])
+    found = _columns(f"{path}, line {header[0]}", _renamed(f"{path}, line {header[0]}", header[1], columns or {}))
     width = len(header[1])
     places: list[str] = []
     rows: list[list[float]] = []
+    skipped: list[str] = []
     for number, cells in lines:
-        where = f"{path}, line {number}"
-        if len(cells) != width:
-            raise AnalysisError(f"{where}: the header names {width} columns, the row has {len(cells)}; correct the row")
         if len(rows) == _MOST_ROWS:
-            raise AnalysisError(f"{where}: a log holds up to {_MOST_ROWS} timesteps; split the file")
-        rows.append([value for pair in _PAIRS for value in _pair(where, pair, columns, cells)])
+            raise AnalysisError(f"{path}, line {number}: a log holds up to {_MOST_ROWS} timesteps; split the file")
+        try:
+            rows.append(_row(f"{path}, line {number}", cells, width, found))
+        except AnalysisError as error:
+            if not skip_bad:
+                raise
+            skipped.append(str(error))
+            continue
         places.append(f"line {number}")
     if not rows:
-        raise AnalysisError(f"{path} has a header but no rows; add one row per timestep")
+        raise AnalysisError(f"{path} has a header but no {'good ' if skipped else ''}rows; add one row per timestep")
     values = np.array(rows)
-    return DisplacementLog(str(path), tuple(places), values[:, 0:2], values[:, 2:4], values[:, 4:6])
+    lengths = values[:, :6] * UNITS[unit]
+    return DisplacementLog(
+        str(path), tuple(places), lengths[:, 0:2], lengths[:, 2:4], lengths[:, 4:6], values[:, 6], tuple(skipped)
+    )
+
+
+def _row(where: str, cells: Sequence[str], width: int, columns: dict[str, int]) -> list[float]:
+    """Read (u, v) of displacement, residual and command, and the turn."""
+    if len(cells) != width:
+        raise AnalysisError(f"{where}: the header names {width} columns, the row has {len(cells)}; correct the row")
+    values = [value for pair in _PAIRS for value in _pair(where, pair, columns, cells)]
+    return [*values, _number(where, TURN, cells[columns[TURN]]) if TURN in columns else 0.0]
+
+
+def _renamed(where: str, header: Sequence[str], columns: Mapping[str, str]) -> list[str]:
+    """Return the header with our names instead of the file's."""
+    ours = {theirs: name for name, theirs in columns.items()}
+    for theirs in ours:
+        if theirs not in header:
+            raise AnalysisError(f"{where}: no column '{theirs[:_SHOWN]}' in the header{suggestion(theirs, header)}")
+    return [ours.get(name, f"other {name}" if name in columns else name) for name in header]
 
 
 def write_log(log: DisplacementLog, path: str | Path) -> None:
@@ -112,9 +153,10 @@ def write_log(log: DisplacementLog, path: str | Path) -> None:
     Raises:
         AnalysisError: the file exists already, or can't be written.
     """
-    arrays = [(DISPLACEMENT, log.displacements_m)]
+    arrays: list[tuple[tuple[str, ...], NDArray[np.float64]]] = [(DISPLACEMENT, log.displacements_m)]
     arrays += [(RESIDUAL, log.residuals_m)] if log.has_residuals else []
     arrays += [(COMMANDED, log.commanded_m)] if log.has_commanded else []
+    arrays += [((TURN,), log.turns_rad[:, None])] if log.turns_rad.any() else []
     rows = np.hstack([values for _, values in arrays]).tolist()
     try:
         with Path(path).open("x", encoding="utf-8", newline="") as file:
@@ -152,15 +194,15 @@ def _columns(where: str, header: Sequence[str]) -> dict[str, int]:
     others = [mark for mark in (";", "\t") if any(mark in cell for cell in header)]
     if others:
         raise AnalysisError(f"{where}: columns are separated by {shown(others[0])}; separate them by commas")
-    for name in _COLUMNS:
+    for name in COLUMNS:
         if header.count(name) > 1:
             raise AnalysisError(f"{where}: column '{name}' is there {header.count(name)} times; leave one")
     for pair in _PAIRS:
         missing = [name for name in pair if name not in header]
         if missing and (pair is DISPLACEMENT or len(missing) == 1):
-            hint = suggestion(missing[0], [cell[:_SHOWN] for cell in header if cell not in _COLUMNS])
+            hint = suggestion(missing[0], [cell[:_SHOWN] for cell in header if cell not in COLUMNS])
             raise AnalysisError(f"{where}: no column '{missing[0]}' in the header{hint}")
-    return {name: header.index(name) for name in _COLUMNS if name in header}
+    return {name: header.index(name) for name in COLUMNS if name in header}
 
 
 def _pair(where: str, names: tuple[str, str], columns: dict[str, int], cells: Sequence[str]) -> tuple[float, float]:

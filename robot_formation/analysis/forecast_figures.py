@@ -28,13 +28,16 @@ _CM = 100.0
 _MANY = 60  # timesteps from which on single marks would run into each other
 
 
-def draw_forecasts(log: DisplacementLog, forecasts: Sequence[OneStepForecasts], path: str | Path) -> Path:
+def draw_forecasts(
+    log: DisplacementLog, forecasts: Sequence[OneStepForecasts], path: str | Path, best: str | None = None
+) -> Path:
     """Draw forecasts with their 90 % bands over what came: a column per predictor, u above v.
 
     Args:
         log: the log.
         forecasts: of 1 to `MOST_DRAWN` predictors.
         path: file to write; an older picture there is replaced.
+        best: name of the predictor that is marked as the one with the least error.
 
     Raises:
         AnalysisError: the file can't be written.
@@ -43,7 +46,9 @@ def draw_forecasts(log: DisplacementLog, forecasts: Sequence[OneStepForecasts], 
     figure = new_figure(max(7.2, 1.0 + 3.8 * columns), 5.6)
     panels = figure.subplots(2, columns, sharex=True, sharey="row", squeeze=False)
     for column, (forecast, colour) in enumerate(zip(forecasts, _COLOURS, strict=False)):
-        panels[0, column].set_title(forecast.name, fontsize=11)
+        marked = forecast.name == best
+        title = f"{forecast.name} (least RMSE)" if marked else forecast.name
+        panels[0, column].set_title(title, fontsize=11, fontweight="bold" if marked else "normal")
         for row in range(2):
             _panel(panels[row, column], log.targets_m[:, row], forecast, row, colour)
         panels[1, column].set_xlabel("timestep")

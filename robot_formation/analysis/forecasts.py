@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.quantiles import ELLIPSE_90
-from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
+from robot_formation.koopman.predictors import Ahead, PredictionError, Predictor, PredictorParameters
+from robot_formation.koopman.predictors.models import Diagnostics
+from robot_formation.koopman.predictors.spatial import after
 
 _TABLE = (
     ("n", "rmse_u", "rmse_v", "rmse", "median", "worst", "coverage_90"),
@@ -29,12 +31,16 @@ class OneStepForecasts:
         means_m: (n, 2) forecast ideal move (u, v), metres.
         covariances_m2: (n, 2, 2) of the ideal move about the forecast, square metres.
         error_m: n, RMSE, median and largest |error| in metres, share inside the 90 % ellipse; see `error_statistics`.
+        horizon: the same of the ways of 1, 2, ... timesteps, with `h`; empty if not asked for.
+        model: K and what is known of it at the log's end; see `model_of`.
     """
 
     name: str
     means_m: NDArray[np.float64]
     covariances_m2: NDArray[np.float64]
     error_m: Mapping[str, float | None]
+    horizon: tuple[Mapping[str, float | None], ...] = ()
+    model: Mapping[str, object] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
         """Return what the command line's JSON says of a predictor."""
@@ -42,29 +48,114 @@ class OneStepForecasts:
             "forecast": _rows(self.means_m),
             "covariance": _rows(self.covariances_m2),
             "error_m": dict(self.error_m),
+            **({"horizon": [dict(found) for found in self.horizon]} if self.horizon else {}),
+            **self.model,
         }
 
 
-def forecast_log(log: DisplacementLog, parameters: PredictorParameters) -> OneStepForecasts:
+def forecast_log(log: DisplacementLog, parameters: PredictorParameters, horizon: int = 0) -> OneStepForecasts:
     """Show a predictor the log row by row, and ask it for each row before it is shown.
+
+    Args:
+        log: the log.
+        parameters: the predictor's.
+        horizon: up to how many timesteps ahead the ways are judged too; 0 for none.
 
     Raises:
         AnalysisError: the predictor refuses a row, which the text names.
     """
     predictor = Predictor(parameters)
     means, covariances = np.full((len(log), 2), np.nan), np.full((len(log), 2, 2), np.nan)
+    ahead: list[list[Ahead]] = []
     for t, place in enumerate(log.places):
         if t > 0:
             forecast = predictor.predict()
-            means[t], covariances[t] = forecast.mean, forecast.covariance
+            means[t], covariances[t] = forecast.mean[:2], forecast.covariance[:2, :2]
+            if horizon:
+                ahead.append(predictor.ahead(horizon))
         try:
-            predictor.observe(log.displacements_m[t], _known(log.residuals_m[t]), _known(log.commanded_m[t]))
+            displacement = np.append(log.displacements_m[t], log.turns_rad[t])
+            turned = bool(log.turns_rad.any())
+            predictor.observe(
+                displacement, _known(log.residuals_m[t], turned), _known(log.commanded_m[t], False, log.turns_rad[t])
+            )
         except PredictionError as error:
             raise AnalysisError(
                 f"{log.source}, {place}: {error}; correct it (metres), or raise predictor.max_u_m and max_v_m"
             ) from error
     statistics = error_statistics(log.targets_m - means, covariances)
-    return OneStepForecasts(parameters.name, means, covariances, statistics)
+    horizons = tuple({"h": h, **_way_statistics(log, ahead, h)} for h in range(1, horizon + 1))
+    return OneStepForecasts(
+        parameters.name, means, covariances, statistics, horizons, model_of(predictor.diagnostics())
+    )
+
+
+def _way_statistics(log: DisplacementLog, ahead: Sequence[Sequence[Ahead]], h: int) -> dict[str, float | None]:
+    """Sum up errors of the ways of h timesteps: forecasts after row s against what was driven in rows s+1 to s+h."""
+    errors, covariances = [], []
+    residuals = log.residuals_m if log.has_residuals else np.zeros_like(log.residuals_m)
+    totals = np.column_stack([log.displacements_m, log.turns_rad])
+    for start, forecasts in enumerate(ahead, 1):
+        if start + h > len(log):
+            break
+        driven = totals[start]
+        for total in totals[start + 1 : start + h]:
+            driven = after(driven, total)
+        ideal = after(driven, np.append(residuals[start + h - 1], 0.0))
+        errors.append((ideal - forecasts[h - 1].way)[:2])
+        covariances.append(forecasts[h - 1].way_covariance[:2, :2])
+    count = len(errors)
+    return error_statistics(np.array(errors).reshape(count, 2), np.array(covariances).reshape(count, 2, 2))
+
+
+def model_of(diagnostics: Diagnostics) -> dict[str, object]:
+    """Return what the command line's JSON says of a model: K, eigenvalues with their periods, weights.
+
+    Returns:
+        `k` and `condition_number`; `eigenvalues`, each with `re`, `im`, `modulus`, `period` (timesteps, None if it is
+        no oscillation), and `residual`, `noise`, `spurious` as in `EigenvalueQuality` (None with too few rows);
+        `consistency_index`; `weights` of experts by axis. None where the model has none.
+    """
+    k, values = diagnostics.k, diagnostics.eigenvalues
+    qualities = diagnostics.qualities
+    rows: list[dict[str, object]] | None = None
+    if qualities is not None:
+        rows = [_eigenvalue(found.eigenvalue, found.residual, found.noise, found.spurious) for found in qualities]
+    elif values is not None:
+        rows = [_eigenvalue(value, None, None, None) for value in sorted(values.tolist(), key=abs, reverse=True)]
+    return {
+        "k": None if k is None else k.tolist(),
+        "condition_number": _finite(diagnostics.condition_number),
+        "eigenvalues": rows,
+        "consistency_index": diagnostics.consistency,
+        "weights": None if diagnostics.weights is None else {a: dict(w) for a, w in diagnostics.weights.items()},
+    }
+
+
+def _eigenvalue(
+    value: complex, residual: float | None, noise: float | None, spurious: bool | None
+) -> dict[str, object]:
+    angle = abs(float(np.angle(value)))
+    return {
+        "re": value.real,
+        "im": value.imag,
+        "modulus": abs(value),
+        "period": 2.0 * np.pi / angle if angle > 1e-9 else None,
+        "residual": residual,
+        "noise": noise,
+        "spurious": spurious,
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and np.isfinite(value) else None
+
+
+def best_of(forecasts: Sequence[OneStepForecasts]) -> str | None:
+    """Name the predictor of the smallest RMSE; None if nothing can be compared."""
+    known = [(found.error_m["rmse"], number) for number, found in enumerate(forecasts)]
+    ranked = sorted((rmse, number) for rmse, number in known if rmse is not None)
+    return forecasts[ranked[0][1]].name if len(ranked) > 1 else None
 
 
 def error_statistics(errors_m: NDArray[np.float64], covariances_m2: NDArray[np.float64]) -> dict[str, float | None]:
@@ -111,11 +202,26 @@ def error_table(log: DisplacementLog, forecasts: Sequence[OneStepForecasts]) -> 
     head = f"{log.source}: {len(log)} timesteps, {commands} commands; errors of one-step forecasts of {target}"
     width = max(len("predictor"), *(len(forecast.name) for forecast in forecasts))
     keys, names, units = _TABLE
+    best = best_of(forecasts)
     lines = [_line("predictor", names, width), _line("", units, width)]
     lines.append("-" * len(lines[0]))
     lines += [
-        _line(forecast.name, [_cell(key, forecast.error_m[key]) for key in keys], width) for forecast in forecasts
+        _line(forecast.name, [_cell(key, forecast.error_m[key]) for key in keys], width)
+        + (" <- least RMSE" if forecast.name == best else "")
+        for forecast in forecasts
     ]
+    steps = [found["h"] for found in forecasts[0].horizon]
+    if steps:
+        lines += ["", "RMSE of the way of h timesteps, mm (share inside its 90 % ellipse)"]
+        lines.append(f"{'predictor':<{width}}" + "".join(f"{f'h = {h:.0f}':>14}" for h in steps if h is not None))
+        lines += [
+            f"{forecast.name:<{width}}"
+            + "".join(
+                f"{_cell('rmse', of['rmse']) + ' (' + _cell('coverage_90', of['coverage_90']) + ')':>14}"
+                for of in forecast.horizon
+            )
+            for forecast in forecasts
+        ]
     return "\n".join([head, "", *lines])
 
 
@@ -124,8 +230,8 @@ def _rows(values: NDArray[np.float64]) -> list[object]:
     return [None if np.isnan(row).any() else row.tolist() for row in values]
 
 
-def _known(uv_m: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    return uv_m if np.isfinite(uv_m).all() else None
+def _known(uv_m: NDArray[np.float64], turn_unknown: bool, turn_rad: float = 0.0) -> NDArray[np.float64] | None:
+    return np.append(uv_m, np.nan if turn_unknown else turn_rad) if np.isfinite(uv_m).all() else None
 
 
 def _line(name: str, cells: Sequence[str], width: int) -> str:

@@ -116,11 +116,13 @@ def load_displacements(path: str | Path, robot: str, namespace: str | None = Non
         raise AnalysisError(f"{path} has no displacements of '{robot}'; give the bag of a run with finished timesteps")
     by_stamp = [{entry.stamp_ns: entry.motion for entry in _stamped(messages[topic])} for topic in topics]
     stamps = sorted(by_stamp[0])
-    columns = [
+    displacements, residuals, commanded = (
         np.array([(found[stamp].u_m, found[stamp].v_m) if stamp in found else (math.nan, math.nan) for stamp in stamps])
         for found in by_stamp
-    ]
-    return DisplacementLog(str(path), tuple(f"timestep {t}" for t in range(1, len(stamps) + 1)), *columns)
+    )
+    turns_rad = np.array([by_stamp[0][stamp].yaw_rad for stamp in stamps])
+    places = tuple(f"timestep {t}" for t in range(1, len(stamps) + 1))
+    return DisplacementLog(str(path), places, displacements, residuals, commanded, turns_rad)
 
 
 def _require_displacements(bag: FormationBag, robot: str) -> None:
@@ -173,8 +175,8 @@ def _follower(
         robot,
         moved,
         displacements,
-        residuals,
-        predictions,
+        _with_known_turns(residuals),
+        _with_known_turns(predictions),
         states=tuple(message.data for message in messages[states]),
         state_stamps_ns=tuple(stamps[states]),
         commands=tuple(_motion(message.pose) for message in messages[names.MOVE.of(robot)]),
@@ -185,10 +187,23 @@ def _stamped(messages: Sequence[Message]) -> tuple[Stamped, ...]:
     """Turn PoseWithCovarianceStamped messages into stamped displacements; NaN where a negative variance says 'none'."""
     none = Motion(math.nan, math.nan)
     return tuple(
-        Stamped(_stamp_ns(message), _motion(message.pose.pose), _covariance_uv(message.pose.covariance))
+        Stamped(
+            _stamp_ns(message),
+            _motion(message.pose.pose),
+            _covariance_uv(message.pose.covariance),
+            float(message.pose.covariance[35]),
+        )
         if message.pose.covariance[0] >= 0.0
-        else Stamped(_stamp_ns(message), none)
+        else Stamped(_stamp_ns(message), none, turn_variance=-1.0)
         for message in messages
+    )
+
+
+def _with_known_turns(found: tuple[Stamped, ...]) -> tuple[Stamped, ...]:
+    """Tell a turn that is known from one that older runs left out: they gave no variance, and a turn only if known."""
+    return tuple(
+        replace(entry, turn_variance=-1.0) if entry.turn_variance == 0.0 and entry.motion.yaw_rad == 0.0 else entry
+        for entry in found
     )
 
 

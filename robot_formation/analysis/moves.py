@@ -9,7 +9,7 @@ moves by kind
     the same moves by what the fine-tuner said of them: `correct: REASON` or `search: REASON`.
 loss
     from the end of the first look that didn't show the neighbour (`hold` or `search`) to the end of the look that
-    showed it again (`reacquired`), or to where the follower gave up (`lost`).
+    showed it again (`reacquired`), or to where the follower gave up (`lost`). A blackout is none.
 """
 
 from __future__ import annotations
@@ -81,12 +81,18 @@ def losses(follower: FollowerRecord) -> tuple[Loss, ...]:
     found: list[Loss] = []
     begun: int | None = None
     looks = moves = 0
+    blind = False
     for number, (t, text) in enumerate(_with_timestep(follower.states)):
         state = AlignmentState.parse(text)
         if state in _NOT_SEEN:
             begun = number if begun is None else begun
             looks, moves = looks + 1, moves + (state is AlignmentState.SEARCH)
+        elif state is AlignmentState.BLIND:
+            blind = True
+        elif state is AlignmentState.REACQUIRED and blind and begun is None:
+            blind = False  # seen at the first look after a blackout
         elif state in _SEEN_OR_LOST:
+            blind = False
             first = number if begun is None else begun
             found.append(Loss(t, looks, moves, _seconds(follower, first, number), state is AlignmentState.REACQUIRED))
             begun, looks, moves = None, 0, 0
@@ -117,6 +123,11 @@ def move_totals(timesteps: Sequence[Moves], movements: Sequence[int], follower: 
         "reacquisition_median_s": median(seconds) if seconds else None,
         "reacquisition_max_s": max(seconds, default=None),
     }
+
+
+def is_blind(follower: FollowerRecord, t: int) -> bool:
+    """Return whether the follower drove timestep t without its camera."""
+    return any(AlignmentState.parse(text) is AlignmentState.BLIND for text in _texts(follower, t))
 
 
 def _with_timestep(states: Sequence[str]) -> Iterator[tuple[int, str]]:

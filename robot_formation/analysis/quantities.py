@@ -10,8 +10,11 @@ formation error
     reports (ground truth), d to the right of the beacon neighbour B (0.32 m by default). Over the timesteps: RMSE of
     |e|; bias, the mean of e in B's frame as u and v; scatter, the RMS distance from it. RMSE^2 = bias^2 + scatter^2.
 prediction coverage
-    share of the timesteps from 4 on whose ideal move, displacement + residual, lies inside the 90 % ellipse of the
-    prediction (a Gaussian's, by the published covariance).
+    share of the timesteps from 4 on whose ideal move, the displacement followed by the residual, lies inside the 90 %
+    ellipse of the prediction (a Gaussian's in u and v, by the published covariance). Of the turn apart: inside the 90 %
+    interval, where residual and prediction tell a turn.
+blind timestep
+    one without the camera (a blackout): its residual is unknown, its formation error is as of any other.
 overhead error
     distance in world x, y between a robot's reference dot as the overhead tracker saw it and the dot's true place.
 heading error
@@ -25,16 +28,16 @@ What is unavailable is None. Frames and signs: v = +x (forward), u = -y (to the 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.analysis.errors import AnalysisError
-from robot_formation.analysis.moves import Moves, move_totals, movements_of, moves_of
-from robot_formation.analysis.quantiles import ELLIPSE_90
-from robot_formation.analysis.run_record import FollowerRecord, RunRecord
+from robot_formation.analysis.moves import Moves, is_blind, move_totals, movements_of, moves_of
+from robot_formation.analysis.quantiles import ELLIPSE_90, NORMAL_90
+from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
 from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.json_values import JsonObject
@@ -61,6 +64,9 @@ class Timestep:
     corrections: Corrections
     moves: Moves
     residual: Motion | None
+    predicted_turn_rad: float | None
+    residual_turn_rad: float | None
+    blind: bool
     error_uv_m: tuple[float, float] | None
     heading_error_rad: float | None
 
@@ -84,7 +90,11 @@ class Timestep:
             "movements": self.corrections.movements,
             "formation_error_m": self.formation_error_m,
             "heading_error_rad": self.heading_error_rad,
+            "predicted_turn_rad": self.predicted_turn_rad,
+            "moved_turn_rad": self.moved.yaw_rad,
             "correction_turn_rad": self.corrections.turn_rad,
+            "residual_turn_rad": self.residual_turn_rad,
+            "blind": self.blind,
             "moves_by_axis": self.moves.axes,
             "moves_by_kind": self.moves.kinds,
         }
@@ -154,6 +164,11 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
     counts = [timestep.corrections.movements for timestep in timesteps]
     values.update(move_totals([timestep.moves for timestep in timesteps], counts, follower))
     values["prediction_coverage_90"] = prediction_coverage(follower)
+    values["prediction_turn_coverage_90"] = prediction_turn_coverage(follower)
+    values["blind_timesteps"] = sum(timestep.blind for timestep in timesteps)
+    values["formation_error_blind_max_m"] = max(
+        (t.formation_error_m for t in timesteps if t.blind and t.formation_error_m is not None), default=None
+    )
     values["timesteps_finished"] = finished
     values["timesteps_planned"] = record.timesteps_planned
     values["unfinished_timestep"] = None
@@ -195,20 +210,36 @@ def totals(timesteps: Sequence[Timestep]) -> JsonObject:
 def prediction_coverage(follower: FollowerRecord) -> float | None:
     """Share of the counted timesteps whose ideal move lies in the prediction's 90 % ellipse; None if there are none."""
     inside = []
-    for displacement, residual, prediction in zip(
+    for displacement, residual, prediction in _forecast_timesteps(follower):
+        uu, uv, vv = prediction.covariance_uv
+        if not (residual.motion.finite and prediction.motion.finite) or uu * vv - uv**2 <= 0.0:
+            continue
+        ideal = displacement.motion.then(residual.motion)
+        u_m, v_m = ideal.u_m - prediction.motion.u_m, ideal.v_m - prediction.motion.v_m
+        squared = (vv * u_m**2 - 2.0 * uv * u_m * v_m + uu * v_m**2) / (uu * vv - uv**2)
+        inside.append(squared <= ELLIPSE_90)
+    return sum(inside) / len(inside) if inside else None
+
+
+def prediction_turn_coverage(follower: FollowerRecord) -> float | None:
+    """Share of the counted timesteps whose ideal turn lies in the prediction's 90 % interval; None without any."""
+    inside = []
+    for displacement, residual, prediction in _forecast_timesteps(follower):
+        if residual.turn_rad is None or prediction.turn_rad is None or prediction.turn_variance <= 0.0:
+            continue
+        error_rad = displacement.motion.yaw_rad + residual.turn_rad - prediction.turn_rad
+        inside.append(abs(error_rad) <= NORMAL_90 * math.sqrt(prediction.turn_variance))
+    return sum(inside) / len(inside) if inside else None
+
+
+def _forecast_timesteps(follower: FollowerRecord) -> Iterator[tuple[Stamped, Stamped, Stamped]]:
+    """Yield displacement, residual and prediction of each timestep from 4 on."""
+    return zip(
         follower.displacements[COLLECTION_TIMESTEPS:],
         follower.residuals[COLLECTION_TIMESTEPS:],
         follower.predictions[COLLECTION_TIMESTEPS - 1 :],
         strict=False,
-    ):
-        uu, uv, vv = prediction.covariance_uv
-        if not (residual.motion.finite and prediction.motion.finite) or uu * vv - uv**2 <= 0.0:
-            continue
-        u_m = displacement.motion.u_m + residual.motion.u_m - prediction.motion.u_m
-        v_m = displacement.motion.v_m + residual.motion.v_m - prediction.motion.v_m
-        squared = (vv * u_m**2 - 2.0 * uv * u_m * v_m + uu * v_m**2) / (uu * vv - uv**2)
-        inside.append(squared <= ELLIPSE_90)
-    return sum(inside) / len(inside) if inside else None
+    )
 
 
 def overhead_errors(record: RunRecord) -> dict[str, dict[str, float]] | None:
@@ -232,17 +263,20 @@ def corrections_of(follower: FollowerRecord, indices: Sequence[int]) -> Correcti
 
 def _timestep(record: RunRecord, follower: FollowerRecord, t: int) -> Timestep:
     displacement = follower.displacements[t - 1]
-    residual = follower.residuals[t - 1].motion if t <= len(follower.residuals) else None
-    predicted = follower.predictions[t - 2].motion if 2 <= t <= len(follower.predictions) + 1 else None
+    left = follower.residuals[t - 1] if t <= len(follower.residuals) else None
+    forecast = follower.predictions[t - 2] if 2 <= t <= len(follower.predictions) + 1 else None
     error_uv, heading_error = _ground_truth(record, follower.name, displacement.stamp_ns)
     indices = _moves(record, follower, t)
     return Timestep(
         t=t,
-        predicted=predicted if predicted and predicted.finite else None,
+        predicted=forecast.motion if forecast and forecast.motion.finite else None,
         moved=displacement.motion,
         corrections=corrections_of(follower, indices),
         moves=moves_of(follower, indices, t),
-        residual=residual if residual and residual.finite else None,
+        residual=left.motion if left and left.motion.finite else None,
+        predicted_turn_rad=forecast.turn_rad if forecast else None,
+        residual_turn_rad=left.turn_rad if left else None,
+        blind=is_blind(follower, t),
         error_uv_m=error_uv,
         heading_error_rad=heading_error,
     )

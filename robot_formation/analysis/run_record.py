@@ -19,11 +19,19 @@ DOT_HEIGHT_M = 0.216
 
 @dataclass(frozen=True)
 class Stamped:
-    """A displacement, the simulated time it is a fact of [ns], and its covariances (u, u), (u, v), (v, v) [m^2]."""
+    """A displacement, the simulated time it is a fact of [ns], its covariances (u, u), (u, v), (v, v) [m^2], and the
+    variance of its turn [rad^2]; negative if the turn isn't known.
+    """
 
     stamp_ns: int
     motion: Motion
     covariance_uv: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn_variance: float = 0.0
+
+    @property
+    def turn_rad(self) -> float | None:
+        """The turn, anticlockwise; None if it isn't known."""
+        return self.motion.yaw_rad if self.motion.finite and self.turn_variance >= 0.0 else None
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,10 @@ class RunRow(Protocol):
         """Name of the track."""
 
     @property
+    def path(self) -> str:
+        """Name of the leader's path."""
+
+    @property
     def surface(self) -> str:
         """Name of the surface."""
 
@@ -61,25 +65,26 @@ class RunRow(Protocol):
 
 
 def summarise(rows: Sequence[RunRow]) -> list[JsonObject]:
-    """Summarise runs by track, surface and predictor, in order of appearance; None where nothing is known."""
-    groups: dict[tuple[str, str, str], dict[int, RunRow]] = {}
+    """Summarise runs by track, path, surface and predictor, in order of appearance; None where nothing is known."""
+    groups: dict[tuple[str, str, str, str], dict[int, RunRow]] = {}
     for row in rows:
-        groups.setdefault((row.track, row.surface, row.predictor), {})[row.seed] = row
+        groups.setdefault((row.track, row.path, row.surface, row.predictor), {})[row.seed] = row
     found = []
-    for (track, surface, predictor), runs in groups.items():
-        entry: JsonObject = {"track": track, "surface": surface, "predictor": predictor, "runs": len(runs)}
+    for (track, path, surface, predictor), runs in groups.items():
+        entry: JsonObject = {"track": track, "path": path, "surface": surface, "predictor": predictor}
+        entry["runs"] = len(runs)
         entry["lost"] = sum(row.lost for row in runs.values())
         entry["lost_rate"] = entry["lost"] / len(runs)
         for name in MEDIANS:
             entry[name] = median_with_interval(_known(runs.values(), name))
         coverages = [row.prediction_coverage_90 for row in runs.values() if row.prediction_coverage_90 is not None]
         entry["prediction_coverage_90"] = float(np.mean(coverages)) if coverages else None
-        baseline = groups.get((track, surface, BASELINE))
+        baseline = groups.get((track, path, surface, BASELINE))
         entry["reduction"] = median_with_interval(_reductions(runs, baseline)) if baseline else None
         entry["ratio_to"] = {
-            other: median_with_interval(_ratios(runs, groups[track, surface, other]))
-            for other in dict.fromkeys(key[2] for key in groups)
-            if other != predictor and (track, surface, other) in groups
+            other: median_with_interval(_ratios(runs, groups[track, path, surface, other]))
+            for other in dict.fromkeys(key[3] for key in groups)
+            if other != predictor and (track, path, surface, other) in groups
         }
         found.append(entry)
     return found
@@ -143,16 +148,16 @@ def _ratio(own_m: float, other_m: float) -> float:
 
 
 def table(summary: Sequence[JsonObject]) -> str:
-    """Print the summary as a Markdown table: cm, with intervals in brackets."""
-    lines = [
-        "| track | surface | predictor | runs | lost | correction [cm] | reduction [%] | RMSE [cm] | moves per step | "
-        "in 90 % ellipse [%] |",
-        "|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    """Print the summary as a Markdown table: cm, with intervals in brackets; paths only if not all are straight."""
+    named: tuple[str, ...] = ("track", "path", "surface", "predictor", "runs", "lost")
+    if all(entry["path"] == "straight" for entry in summary):
+        named = tuple(name for name in named if name != "path")
+    heads = (*named, "correction [cm]", "reduction [%]", "RMSE [cm]", "moves per step", "in 90 % ellipse [%]")
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for entry in summary:
         coverage = entry["prediction_coverage_90"]
         cells = [
-            *(str(entry[name]) for name in ("track", "surface", "predictor", "runs", "lost")),
+            *(str(entry[name]) for name in named),
             _cell(entry["correction_m"], 100.0),
             _cell(entry["reduction"], 100.0, 0),
             _cell(entry["formation_error_rmse_m"], 100.0, 2),

@@ -20,6 +20,7 @@ _OF_FOLLOWERS = (
     names.RESIDUAL,
     names.COMMANDED,
     names.PREDICTION,
+    names.FORECAST,
     names.ALIGNMENT,
     names.BLOCKS,
     names.camera_image(),

@@ -9,7 +9,7 @@ import csv
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Generic, TypeVar, get_args, get_type_hints
 
@@ -30,6 +30,7 @@ class ResumableTable(Generic[Row]):
         error: makes what is raised.
         foreign: what the file isn't if it has other columns, and what to do then.
         damaged: what to do about a line that can't be read.
+        added: columns that tables written before lack, and the text that stands for them there.
     """
 
     path: Path
@@ -37,6 +38,7 @@ class ResumableTable(Generic[Row]):
     error: Callable[[str], FormationError]
     foreign: str
     damaged: str = "delete it to run it again"
+    added: Mapping[str, str] = field(default_factory=dict)
 
     def read(self) -> Iterator[Row]:
         """Read the rows; a half-written last one is left out.
@@ -49,14 +51,17 @@ class ResumableTable(Generic[Row]):
             whole = list(whole_lines(self.path))
         except (OSError, ValueError) as error:
             raise self.error(f"{self.path}: can't read it: {error}") from None
-        if not whole or whole[0].rstrip() != ",".join(kinds):
+        former = {name: kind for name, kind in kinds.items() if name not in self.added}
+        header = whole[0].rstrip() if whole else ""
+        added = self.added if header == ",".join(former) else {}
+        if header != ",".join(former if added else kinds):
             raise self.error(f"{self.path}: {self.foreign}")
         reader = csv.reader(whole)
         next(reader)
         try:
             for cells in reader:
-                pairs = zip(kinds.items(), cells, strict=True)
-                yield self.row(**{name: _value(kind, cell) for (name, kind), cell in pairs})
+                texts = {**added, **dict(zip(former if added else kinds, cells, strict=True))}
+                yield self.row(**{name: _value(kind, texts[name]) for name, kind in kinds.items()})
         except (ValueError, csv.Error):
             raise self.error(f"{self.path}: line {reader.line_num} can't be read; {self.damaged}") from None
 

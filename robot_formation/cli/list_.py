@@ -9,16 +9,19 @@ import textwrap
 from typing import Any
 
 from robot_formation.cli.parser import Subparsers
+from robot_formation.parameters import specs
 
 
 def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser(
         "list",
-        help="list tracks, surfaces, predictors and robots",
+        help="list tracks, paths, surfaces, predictors and robots",
         description="List what can be named in other verbs.",
     )
-    parser.add_argument("what", nargs="?", choices=("tracks", "surfaces", "predictors", "robots"), help="only these")
+    parser.add_argument(
+        "what", nargs="?", choices=("tracks", "paths", "surfaces", "predictors", "robots"), help="only these"
+    )
     parser.add_argument("--json", action="store_true", help="machine-readable, on standard output")
     parser.set_defaults(run=run)
 
@@ -49,6 +52,7 @@ def collect() -> dict[str, dict[str, str]]:
     """Collect names and descriptions by kind."""
     from robot_formation.experiment import scenario
     from robot_formation.koopman.predictors import DESCRIPTIONS
+    from robot_formation.leader.paths import PATHS
     from robot_formation.surface import SURFACES
 
     tracks = {}
@@ -62,6 +66,7 @@ def collect() -> dict[str, dict[str, str]]:
         )
     return {
         "tracks": tracks,
+        "paths": {name: f"{_first_line(kind)} {_parameters(kind)}".strip() for name, kind in PATHS.items()},
         "surfaces": {name: _first_line(kind) for name, kind in SURFACES.items()},
         "predictors": DESCRIPTIONS,
         "robots": {
@@ -69,6 +74,13 @@ def collect() -> dict[str, dict[str, str]]:
             "follower_1": "keeps 32 cm to the right of the leader; --set followers=N adds follower_2 .. follower_N",
         },
     }
+
+
+def _parameters(kind: type) -> str:
+    """List a path's parameters with their defaults; those that follow from elsewhere with the place."""
+    elsewhere = {"step_m": "leader.step_m", "phase": "by seed"}
+    found = [f"{name}={elsewhere.get(name, spec.default)}" for name, spec in specs(kind).items()]
+    return f"[{', '.join(found)}]" if found else ""
 
 
 def _first_line(thing: Any) -> str:

@@ -1,4 +1,4 @@
-"""`formation predict`: predictors on a displacement log, one step ahead."""
+"""`formation predict`: predictors on a displacement log, one timestep ahead or several."""
 
 from __future__ import annotations
 
@@ -23,11 +23,13 @@ DESCRIPTION = """\
 Forecast every timestep of a displacement log from those before it, and compare the forecasts with what came: the ideal
 move (displacement plus residual) if the log has residuals, else the displacement. LOG.csv has a header and the columns
 u_m and v_m (metres, u to the right, v forward), and where they are known residual_u_m and residual_v_m (what was left
-to go at the end), commanded_u_m and commanded_v_m (the displacement if the robot had gone exactly as told).
+to go at the end), commanded_u_m and commanded_v_m (the displacement if the robot had gone exactly as told), turn_rad.
 """
 _SUFFIXES = (".png", ".pdf", ".svg")
 _DRAWN = ("previous", "measured", "formation")
 """What the picture shows if no predictors are named."""
+_FARTHEST = 50
+"""Most timesteps ahead."""
 _LONG = 20_000
 """Rows from which on a predictor takes long enough to be announced."""
 
@@ -61,6 +63,22 @@ def add_parser(subparsers: Subparsers) -> None:
         default=[],
         help="parameter of the predictors, like predictor.forgetting=0.95; may be repeated",
     )
+    parser.add_argument(
+        "--horizon",
+        metavar="H",
+        type=_horizon,
+        default=0,
+        help=f"judge forecasts of the ways of 1 to H timesteps too (up to {_FARTHEST})",
+    )
+    parser.add_argument(
+        "--columns",
+        metavar="NAME=COLUMN,...",
+        action=Names,
+        default=(),
+        help="what the file calls its columns, like u_m=dx,v_m=dy,turn_rad=dyaw",
+    )
+    parser.add_argument("--unit", choices=("m", "cm", "mm"), help="unit of lengths in the file (default: m)")
+    parser.add_argument("--skip-bad", action="store_true", help="leave bad rows out and say how many there were")
     picture = parser.add_mutually_exclusive_group()
     picture.add_argument(
         "--figure",
@@ -85,19 +103,20 @@ def run(args: argparse.Namespace) -> int:
     # Imported here, so that the other verbs don't pay for NumPy.
     import json
 
-    from robot_formation.analysis.forecasts import error_table, forecast_log
+    from robot_formation.analysis.forecasts import best_of, error_table, forecast_log
 
     chosen = predictors(args.predictors, args.set)
-    log = read(args)
+    log = read(args, chosen[0])
     forecasts = []
     for parameters in chosen:
         if len(log) >= _LONG:
             print(f"{parameters.name}: {len(log)} timesteps", file=sys.stderr, flush=True)
-        forecasts.append(forecast_log(log, parameters))
+        forecasts.append(forecast_log(log, parameters, args.horizon))
     picture = _draw(args, log, forecasts)
     _warn_of_bounds(log, chosen[0])
     if args.json:
-        print(json.dumps({"predictors": {found.name: found.to_json() for found in forecasts}}, allow_nan=False))
+        told = {"predictors": {found.name: found.to_json() for found in forecasts}, "best": best_of(forecasts)}
+        print(json.dumps(told, allow_nan=False))
         return 0
     print(error_table(log, forecasts))
     written = [(label, path) for label, path in (("log", args.out), ("picture", picture)) if path is not None]
@@ -128,8 +147,10 @@ def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[Predictor
     return [replace(scenario.predictor, name=name) for name in dict.fromkeys(chosen or NAMES)]
 
 
-def read(args: argparse.Namespace) -> DisplacementLog:
+def read(args: argparse.Namespace, parameters: PredictorParameters) -> DisplacementLog:
     """Read the log from its file or bag, and write a bag's log if that is asked for.
+
+    With --skip-bad, rows that no predictor would take are left out.
 
     Raises:
         FormationError: the log can't be read or written.
@@ -140,7 +161,11 @@ def read(args: argparse.Namespace) -> DisplacementLog:
         for option in ("robot", "namespace", "out"):
             if getattr(args, option) is not None:
                 raise FormationError(f"--{option} belongs to --bag; leave it out, or give a bag instead of a log")
-        return read_log(args.log)
+        log = read_log(args.log, columns=_columns(args.columns), unit=args.unit or "m", skip_bad=args.skip_bad)
+        return _without_absurd(log, parameters) if args.skip_bad else log
+    for option, given in (("columns", args.columns), ("unit", args.unit), ("skip-bad", args.skip_bad)):
+        if given:
+            raise FormationError(f"--{option} belongs to a log; a bag's displacements are in metres and complete")
     # Imported here, so that a log doesn't pay for rosbags.
     from robot_formation.analysis.from_bag import load_displacements
 
@@ -148,6 +173,48 @@ def read(args: argparse.Namespace) -> DisplacementLog:
     if args.out is not None:
         write_log(log, args.out)
     return log
+
+
+def _columns(texts: Sequence[str]) -> dict[str, str]:
+    from robot_formation.analysis.displacement_log import COLUMNS
+    from robot_formation.parameters import suggestion
+
+    found: dict[str, str] = {}
+    for text in texts:
+        name, sign, column = (part.strip() for part in text.partition("="))
+        if not sign or not column:
+            raise FormationError(f"--columns: '{text}' is no NAME=COLUMN, like u_m=dx")
+        if name not in COLUMNS:
+            raise FormationError(f"--columns: no '{name}' in a log{suggestion(name, COLUMNS)}")
+        if name in found or column in found.values():
+            raise FormationError(f"--columns: '{text}' names what is named already; name each once")
+        found[name] = column
+    return found
+
+
+def _without_absurd(log: DisplacementLog, parameters: PredictorParameters) -> DisplacementLog:
+    """Leave out rows that predictors refuse, and say on standard error how many are missing in all."""
+    import numpy as np
+
+    bound = 10.0 * np.array([parameters.max_u_m, parameters.max_v_m])
+    good = np.ones(len(log), dtype=bool)
+    for values in (log.displacements_m, log.residuals_m, log.commanded_m):
+        good &= ~(np.abs(values) > bound).any(axis=1)
+    good &= np.abs(log.turns_rad) <= 10.0 * parameters.max_turn_rad
+    count = len(log.skipped) + int((~good).sum())
+    if not good.any():
+        raise FormationError(f"{log.source} has no row that predictors take; correct it, or give --unit")
+    if count:
+        first = log.skipped[0] if log.skipped else f"{log.source}, {log.places[int(np.argmin(good))]}: too long"
+        print(f"warning: {count} bad row(s) left out; the first: {first}", file=sys.stderr)
+    return replace(
+        log,
+        places=tuple(place for place, kept in zip(log.places, good, strict=True) if kept),
+        displacements_m=log.displacements_m[good],
+        residuals_m=log.residuals_m[good],
+        commanded_m=log.commanded_m[good],
+        turns_rad=log.turns_rad[good],
+    )
 
 
 def _draw(args: argparse.Namespace, log: DisplacementLog, forecasts: Sequence[OneStepForecasts]) -> Path | None:
@@ -158,9 +225,15 @@ def _draw(args: argparse.Namespace, log: DisplacementLog, forecasts: Sequence[On
             return None
         path = _default_picture(args)
     from robot_formation.analysis.forecast_figures import MOST_DRAWN, draw_forecasts
+    from robot_formation.analysis.forecasts import best_of
 
-    wanted = args.predictors or _DRAWN
-    return draw_forecasts(log, [found for found in forecasts if found.name in wanted][:MOST_DRAWN], path)
+    wanted = list(args.predictors or _DRAWN)[:MOST_DRAWN]
+    best = best_of(forecasts)
+    if best is not None and best not in wanted:  # it takes the place of the last one but 'formation'
+        others = [name for name in wanted if name != "formation"]
+        wanted = [name for name in wanted if name != others[-1]] if len(wanted) == MOST_DRAWN else wanted
+        wanted.append(best)
+    return draw_forecasts(log, [found for found in forecasts if found.name in wanted][:MOST_DRAWN], path, best)
 
 
 def _default_picture(args: argparse.Namespace) -> Path:
@@ -183,6 +256,13 @@ def _warn_of_bounds(log: DisplacementLog, parameters: PredictorParameters) -> No
                 f"raise it by --set {name}=...",
                 file=sys.stderr,
             )
+
+
+def _horizon(text: str) -> int:
+    """An argparse type for a number of timesteps."""
+    if not text.isdecimal() or not 1 <= int(text) <= _FARTHEST:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of timesteps from 1 to {_FARTHEST}")
+    return int(text)
 
 
 def _picture(text: str) -> Path:

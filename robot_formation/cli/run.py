@@ -43,6 +43,9 @@ def add_parser(subparsers: Subparsers) -> None:
         help="formation (default), measured (the paper's), previous, ... (see 'formation list')",
     )
     parser.add_argument("--seed", metavar="N", type=whole_number, help="seed of every random stream")
+    parser.add_argument(
+        "--path", metavar="NAME", help="the leader's path: straight, circle, ... (see 'formation list')"
+    )
     parser.add_argument("--surface", metavar="NAME", help="bowl, plane, ... (see 'formation list')")
     parser.add_argument(
         "--set",
@@ -122,6 +125,7 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
     if args.surface is not None:
         scenario = scenarios.with_surface(scenario, args.surface)
     for option, key, value in (
+        ("--path", "leader.path", args.path),
         ("--predictor", "predictor.name", args.predictor),
         ("--seed", "seed", args.seed),
         ("--camera", "world.camera.mode", args.camera),
@@ -162,6 +166,8 @@ def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation
 
         if scenario.world.real_time_factor > 0.0:
             raise FormationError("--in-process runs as fast as it can; leave --real-time-factor out")
+        if scenario.leader.path == "teleop":
+            raise FormationError("--path teleop is driven over ROS topics; leave --in-process out")
         return run_in_process(
             scenario, place.path, run_metadata(scenario), images=args.images, say=say, reservation=place
         )

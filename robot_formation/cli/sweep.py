@@ -1,4 +1,4 @@
-"""`formation sweep`: many runs over tracks, surfaces, predictors and seeds, and what they say together."""
+"""`formation sweep`: many runs over tracks, paths, surfaces, predictors and seeds, and what they say together."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from robot_formation.experiment.sweep import Plan
 
 DESCRIPTION = """\
-Run every combination of tracks, surfaces, predictors and seeds in process (camera on demand; fine-tuner in mode
+Run every combination of tracks, paths, surfaces, predictors and seeds in process (camera on demand; fine-tuner in mode
 'paper', unless --set fine_tuner.mode=precise), and compare the predictors: medians with 95 % bootstrap intervals,
 paired over seeds. The table of runs grows in OUT/runs.csv; a sweep that was stopped goes on there when the same command
 is given again. Besides the predictors of 'formation list', 'ideal' and 'ideal+close' show the noise floor: the same
@@ -42,6 +42,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("sweep", help="compare predictors over many runs", description=DESCRIPTION)
     for name, default, what in (
         ("tracks", ("one", "two"), "preset tracks"),
+        ("paths", ("straight",), "the leader's paths"),
         ("surfaces", ("bowl",), "surfaces"),
         ("predictors", ("previous", "measured", "formation"), "predictors"),
     ):
@@ -74,7 +75,9 @@ def run(args: argparse.Namespace) -> int:
     """
     from robot_formation.experiment import sweep
 
-    plan = sweep.Plan(args.tracks, args.surfaces, args.predictors, seeds(",".join(args.seeds)), tuple(args.set))
+    plan = sweep.Plan(
+        args.tracks, args.surfaces, args.predictors, seeds(",".join(args.seeds)), tuple(args.set), args.paths
+    )
     if args.jobs < 1:
         raise FormationError(f"--jobs is at least 1, not {args.jobs}")
     plan.check()
@@ -128,6 +131,7 @@ def _facts(plan: Plan) -> JsonObject:
     """List what was run, for the JSON."""
     return {
         "tracks": list(plan.tracks),
+        "paths": list(plan.paths),
         "surfaces": list(plan.surfaces),
         "predictors": list(plan.predictors),
         "seeds": list(plan.seeds),

@@ -9,6 +9,7 @@ from robot_formation.cli import (
     doctor,
     info,
     list_,
+    path,
     play,
     predict,
     record,
@@ -21,6 +22,6 @@ from robot_formation.cli import (
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, predict, record, play, info, recover, replay),
+    *(run, sweep, list_, analyze, path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
@@ -11,6 +12,7 @@ from robot_formation.follower import fine_tuning as core
 from robot_formation.follower.alignment_state import State
 from robot_formation.follower.camera_calibration_file import calibrated
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.uncertain_motion import UncertainMotion
 from robot_formation.names import Message
 
 
@@ -25,12 +27,15 @@ class FineTunerComponent(Component):
         listeners = ("leader", "fine_tuner")[: parameters.done_listeners]
         self._done = names.formation_done(place.robot, place.formation, listeners=listeners)
         self._base = place.frame(names.BASE_FRAME)
+        self._answers: dict[int, dict[names.Topic, Message]] = {}  # the predictor's, by stamp
+        self._first_forecast_ns: int | None = None
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
         return [
             Input(self._neighbour, self._on_neighbour_done),
-            Input(names.PREDICTION, self._on_prediction),
+            Input(names.PREDICTION, partial(self._on_answer, names.PREDICTION)),
+            Input(names.FORECAST, partial(self._on_answer, names.FORECAST)),
             Input(names.BLOCKS, self._on_blocks),
             Input(names.MOVED, self._on_moved),
         ]
@@ -58,9 +63,27 @@ class FineTunerComponent(Component):
     def _on_neighbour_done(self, message: Message) -> None:
         self._act(self._tuner.neighbour_done(int(message.data)))
 
-    def _on_prediction(self, message: Message) -> None:
-        known = conversions.has_estimate(message)
-        self._act(self._tuner.prediction(conversions.read_displacement(message) if known else None))
+    def _on_answer(self, topic: names.Topic, message: Message) -> None:
+        """Take the predictor's answer once both of its messages are here, in whatever order they came.
+
+        `forecast` is waited for only after it has been heard of in an earlier timestep: whoever sends none is
+        understood too, and what is heard doesn't depend on the order in which topics arrive.
+        """
+        stamp_ns = conversions.stamp_of(message)
+        if topic == names.FORECAST and self._first_forecast_ns is None:
+            self._first_forecast_ns = stamp_ns
+        self._answers.setdefault(stamp_ns, {})[topic] = message
+        parts = self._answers[stamp_ns]
+        expected = self._first_forecast_ns is not None and self._first_forecast_ns < stamp_ns
+        if names.PREDICTION not in parts or (expected and names.FORECAST not in parts):
+            return
+        self._answers = {stamp: found for stamp, found in self._answers.items() if stamp > stamp_ns}
+        prediction, forecast = parts[names.PREDICTION], parts[names.FORECAST] if expected else None
+        mean = conversions.read_displacement(prediction) if conversions.has_estimate(prediction) else None
+        step = None
+        if forecast is not None and conversions.has_estimate(forecast):
+            step = UncertainMotion(conversions.read_displacement(forecast), conversions.read_covariance(forecast))
+        self._act(self._tuner.prediction(mean, step))
 
     def _on_moved(self, message: Message) -> None:
         self._act(self._tuner.moved(conversions.read_displacement(message), conversions.stamp_of(message)))
@@ -98,9 +121,11 @@ class FineTunerComponent(Component):
     def _report(self, report: core.Report) -> None:
         # The predictor waits for the pair, so what it may use beside them goes first.
         for topic, motion in (
-            (names.COMMANDED, report.commanded),
-            (names.DISPLACEMENT, report.displacement),
+            (names.COMMANDED, None if report.commanded is None else UncertainMotion(report.commanded)),
+            (names.DISPLACEMENT, UncertainMotion(report.displacement)),
             (names.RESIDUAL, report.residual),
         ):
-            covariance = conversions.NO_ESTIMATE if motion is None else (0.0,) * 4
-            self._send(topic, conversions.displacement(motion or Motion(), self._base, self.stamp_ns, covariance))
+            mean, covariance = (
+                (Motion(), conversions.NO_ESTIMATE) if motion is None else (motion.mean, motion.covariance)
+            )
+            self._send(topic, conversions.displacement(mean, self._base, self.stamp_ns, covariance))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,13 +15,13 @@ import numpy as np
 from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.uncertain_motion import covariance_xy
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
+from robot_formation.koopman.predictors.models import Vector
 from robot_formation.names import Message
 from robot_formation.system.files import MOST_RECORD_BYTES, read_file
 
 _MOST_UNPAIRED = 16  # timesteps of which not all parts have come: in a run, one at a time
-# (u, v) to (x, y) = (v, -u): how a covariance of the paper's axes becomes one of REP-103.
-_TO_XY = np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
 class PredictorComponent(Component):
@@ -29,8 +31,8 @@ class PredictorComponent(Component):
         super().__init__(place)
         state_file = parameters.state_file.replace("{robot}", place.robot)
         self._state_file = Path(state_file) if state_file else None
-        self._predictor = self._restored(parameters)
-        # By stamp, then topic: (u, v) [m], None where there is no estimate.
+        self.predictor = self._restored(parameters)
+        # By stamp, then topic: (u, v) [m] with a turn of 0, None where there is no estimate.
         self._parts: dict[int, dict[names.Topic, Message]] = {}
         self._first_commanded_ns: int | None = None
 
@@ -57,7 +59,7 @@ class PredictorComponent(Component):
             return
         unfinished = self._state_file.with_name(self._state_file.name + ".partial")
         try:
-            unfinished.write_text(json.dumps(self._predictor.state()), encoding="utf-8")
+            unfinished.write_text(json.dumps(self.predictor.state()), encoding="utf-8")
             unfinished.replace(self._state_file)
         except OSError as error:
             self.warn(f"can't keep the predictor's state: {error}")
@@ -71,12 +73,12 @@ class PredictorComponent(Component):
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
-        return [names.PREDICTION]
+        return [names.FORECAST, names.PREDICTION]
 
     def details(self) -> dict[str, str]:
         """See `Component`."""
-        diagnostics = self._predictor.diagnostics()
-        values = {"predictor": self._predictor.name, "timesteps": str(self._predictor.observations)}
+        diagnostics = self.predictor.diagnostics()
+        values = {"predictor": self.predictor.name, "timesteps": str(self.predictor.observations)}
         for name, array in (
             ("K", diagnostics.k),
             ("eigenvalues", diagnostics.eigenvalues),
@@ -84,6 +86,14 @@ class PredictorComponent(Component):
         ):
             if array is not None:
                 values[name] = np.array2string(array, precision=6, separator=", ").replace("\n", "")
+        if diagnostics.consistency is not None:
+            values["consistency index"] = f"{diagnostics.consistency:.4g}"
+        if diagnostics.qualities is not None:
+            values["periods (residual, noise)"] = ", ".join(
+                f"{found.period:.1f} ({found.residual:.2f}, {found.noise:.2f}{', spurious' * found.spurious})"
+                for found in diagnostics.qualities
+                if found.period is not None and found.eigenvalue.imag >= 0.0
+            )
         values.update(diagnostics.notes or {})
         if diagnostics.condition_number is not None:
             values["condition number"] = f"{diagnostics.condition_number:.4g}"
@@ -91,10 +101,10 @@ class PredictorComponent(Component):
 
     def actuation_bias(self) -> tuple[float, float]:
         """By how much (u, v) the robot is expected to go farther than told, metres; zero if that isn't learned."""
-        if not self._predictor.observations:
+        if not self.predictor.observations:
             return (0.0, 0.0)
-        forecast = self._predictor.predict()
-        u_m, v_m = (forecast.mean - forecast.command).tolist()
+        forecast = self.predictor.predict()
+        u_m, v_m, _ = (forecast.mean - forecast.command).tolist()
         return (u_m, v_m)
 
     def _on_part(self, topic: names.Topic, message: Message) -> None:
@@ -109,17 +119,19 @@ class PredictorComponent(Component):
         self._answer(stamp_ns)
 
     def _read(self, topic: names.Topic, message: Message) -> Any:
-        """Read (u, v) [m] of a displacement, None where there is no estimate."""
+        """Read (u, v, turn) of a displacement [m, rad], None where there is no estimate; NaN for a turn not known."""
         if not conversions.has_estimate(message):
             if topic == names.DISPLACEMENT:
                 self.warn("a displacement without an estimate is left out")
             return None
         motion = conversions.read_displacement(message)
-        found = np.array([motion.u_m, motion.v_m])
-        if not np.isfinite(found).all():
-            self.warn(f"{topic.name}: ({motion.u_m}, {motion.v_m}) m is not finite; it is left out")
+        if not motion.finite:
+            self.warn(
+                f"{topic.name}: ({motion.u_m}, {motion.v_m}) m, {motion.yaw_rad} rad is not finite; it is left out"
+            )
             return None
-        return found
+        unknown = topic == names.RESIDUAL and not conversions.knows_turn(message)
+        return np.array([motion.u_m, motion.v_m, math.nan if unknown else motion.yaw_rad])
 
     def _answer(self, stamp_ns: int) -> None:
         """Predict once all parts of the timestep are here, in whatever order they came.
@@ -139,20 +151,27 @@ class PredictorComponent(Component):
         if displacement is not None:
             commanded = parts[names.COMMANDED] if expected else None
             try:
-                self._predictor.observe(displacement, parts[names.RESIDUAL], commanded)
+                self.predictor.observe(displacement, parts[names.RESIDUAL], commanded)
             except PredictionError as error:
                 self.warn(str(error))
         try:
-            forecast = self._predictor.predict()
+            forecast = self.predictor.predict()
         except PredictionError as error:
             self.warn(f"{error}; answering with no motion")
-            self._send_prediction(Motion(), conversions.NO_ESTIMATE)
+            for topic in (names.FORECAST, names.PREDICTION):  # the fine-tuner waits for both
+                self._send_answer(topic, Motion(), conversions.NO_ESTIMATE)
             return
-        covariance = _TO_XY @ forecast.about_command @ _TO_XY.T
         self._save()  # before the answer: whoever has it finds the state that goes with it
-        u_m, v_m = forecast.command.tolist()
-        self._send_prediction(Motion.from_uv(u_m, v_m), covariance.ravel().tolist())
+        # The fine-tuner waits for the prediction, so what it may use beside it goes first.
+        covariance = covariance_xy(forecast.covariance)
+        self._send_answer(names.FORECAST, _motion(self.predictor.step(parts[names.RESIDUAL])), covariance)
+        self._send_answer(names.PREDICTION, _motion(forecast.command), covariance_xy(forecast.about_command))
 
-    def _send_prediction(self, mean: Motion, covariance: Sequence[float]) -> None:
+    def _send_answer(self, topic: names.Topic, mean: Motion, covariance: Sequence[float]) -> None:
         base = self.place.frame(names.BASE_FRAME)
-        self._send(names.PREDICTION, conversions.displacement(mean, base, self.stamp_ns, covariance))
+        self._send(topic, conversions.displacement(mean, base, self.stamp_ns, covariance))
+
+
+def _motion(found: Vector) -> Motion:
+    u_m, v_m, turn_rad = found.tolist()
+    return replace(Motion.from_uv(u_m, v_m), yaw_rad=turn_rad)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceStamped, Twist
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import JointState
 
@@ -109,18 +109,27 @@ def read_move(message: PoseStamped) -> Motion:
 
 
 def displacement(
-    motion: Motion, frame: str, stamp_ns: int, covariance_xy: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
+    motion: Motion, frame: str, stamp_ns: int, covariance: Sequence[float] = (0.0,) * 9
 ) -> PoseWithCovarianceStamped:
-    """Make a displacement with the covariance of (x, y), row by row [m^2]; a negative first one means 'no estimate'."""
+    """Make a displacement with its covariance.
+
+    Args:
+        motion: the displacement.
+        frame: whose it is in.
+        stamp_ns: simulated time at which it is a fact.
+        covariance: of (x, y, yaw), or only of (x, y), row by row [m^2, m rad, rad^2]; a negative variance of x says
+            that there is no estimate, a negative one of yaw that the turn isn't known.
+    """
     message = PoseWithCovarianceStamped(header=header(stamp_ns, frame))
     _set_planar(message.pose.pose, motion)
-    covariance = np.zeros((6, 6))
-    covariance[:2, :2] = np.reshape(covariance_xy, (2, 2))
-    message.pose.covariance = covariance.ravel()
+    axes = (0, 1, 5) if len(covariance) == 9 else (0, 1)
+    full = np.zeros((6, 6))
+    full[np.ix_(axes, axes)] = np.reshape(covariance, (len(axes), len(axes)))
+    message.pose.covariance = full.ravel()
     return message
 
 
-NO_ESTIMATE = (-1.0, 0.0, 0.0, 0.0)
+NO_ESTIMATE = (-1.0, *(0.0,) * 8)
 
 
 def read_displacement(message: PoseWithCovarianceStamped) -> Motion:
@@ -128,9 +137,25 @@ def read_displacement(message: PoseWithCovarianceStamped) -> Motion:
     return read_pose(message.pose.pose)
 
 
+def read_covariance(message: PoseWithCovarianceStamped) -> tuple[float, ...]:
+    """Read the covariance of (x, y, yaw), row by row [m^2, m rad, rad^2]."""
+    covariance = message.pose.covariance
+    return tuple(float(covariance[6 * row + column]) for row in (0, 1, 5) for column in (0, 1, 5))
+
+
 def has_estimate(message: PoseWithCovarianceStamped) -> bool:
     """Return whether a displacement was estimated at all."""
     return float(message.pose.covariance[0]) >= 0.0
+
+
+def knows_turn(message: PoseWithCovarianceStamped) -> bool:
+    """Return whether a displacement's turn was estimated."""
+    return has_estimate(message) and float(message.pose.covariance[35]) >= 0.0
+
+
+def read_planar_twist(twist: Twist) -> tuple[float, float, float]:
+    """Read a velocity: ahead and to the left [m/s], anticlockwise [rad/s]; not-finite values are kept."""
+    return float(twist.linear.x), float(twist.linear.y), float(twist.angular.z)
 
 
 def odometry(motion: Motion, frame: str, child: str, stamp_ns: int) -> Odometry:

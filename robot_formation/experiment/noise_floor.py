@@ -114,9 +114,11 @@ def _changed(commanded: Message, change: Motion) -> Message:
     if not conversions.has_estimate(commanded):
         return commanded
     motion = conversions.read_displacement(commanded)
-    changed = Motion(motion.x_m + change.x_m, motion.y_m + change.y_m)
+    changed = Motion(motion.x_m + change.x_m, motion.y_m + change.y_m, motion.yaw_rad)
     stamp_ns = conversions.stamp_of(commanded)
-    return conversions.displacement(changed, commanded.header.frame_id, stamp_ns, (0.0,) * 4)
+    return conversions.displacement(
+        changed, commanded.header.frame_id, stamp_ns, conversions.read_covariance(commanded)
+    )
 
 
 def _pose(message: Message) -> Pose:

@@ -94,7 +94,7 @@ def _replay_predictor(recording: Recording, robot: str, parameters: Any) -> Pred
             take[names.COMMANDED.name](command)
         take[names.DISPLACEMENT.name](displacement)
         take[names.RESIDUAL.name](residual)
-    today = [message for _, message in sent]
+    today = [message for topic, message in sent if topic == names.PREDICTION.name]
     before, after = _by_stamp(recorded), _by_stamp(today)
     rows = []
     for number, displacement in enumerate(displacements):
@@ -110,6 +110,7 @@ def _by_stamp(messages: list[Message]) -> dict[int, Message]:
 
 
 def _estimate(message: Message) -> Motion | None:
+    """Read a motion; None if there is no estimate."""
     if message is None or not conversions.has_estimate(message):
         return None
     return conversions.read_displacement(message)
@@ -119,8 +120,7 @@ def _ideal(displacement: Message, residual: Message) -> Motion | None:
     left = _estimate(residual)
     if left is None:
         return None
-    moved = conversions.read_displacement(displacement)
-    return Motion(moved.x_m + left.x_m, moved.y_m + left.y_m)
+    return conversions.read_displacement(displacement).then(left)
 
 
 @dataclass(frozen=True)

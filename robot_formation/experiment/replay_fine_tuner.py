@@ -105,6 +105,7 @@ class _Script:
     moved: deque[Message]
     blocks: deque[Message]
     prediction: Message
+    forecast: Message
 
 
 class _Driver:
@@ -162,6 +163,8 @@ class _Driver:
         elif waits_for == "look":
             return self._show(script)
         elif waits_for == "prediction" and script.prediction is not None:
+            if script.forecast is not None:
+                self._take[names.FORECAST.name](script.forecast)
             self._take[names.PREDICTION.name](script.prediction)
         else:
             return False
@@ -221,6 +224,7 @@ def _scripts(
     moved = deque(recording.messages(robot, names.MOVED))
     blocks = deque(recording.messages(robot, names.BLOCKS))
     predictions = deque(recording.any_messages(robot, names.PREDICTION))
+    forecasts = {conversions.stamp_of(message): message for message in recording.any_messages(robot, names.FORECAST)}
     ends = [conversions.stamp_of(message) for message in recorded[names.DISPLACEMENT.name]]
     found = []
     for number, (decisions, tick) in enumerate(zip(timesteps, ticks, strict=False)):
@@ -233,5 +237,6 @@ def _scripts(
         while blocks and (end_ns is None or conversions.stamp_of(blocks[0]) <= end_ns):
             own_blocks.append(blocks.popleft())
         prediction = predictions.popleft() if number and predictions else None
-        found.append(_Script(tick, own_moved, own_blocks, prediction))
+        forecast = None if prediction is None else forecasts.get(conversions.stamp_of(prediction))
+        found.append(_Script(tick, own_moved, own_blocks, prediction, forecast))
     return found

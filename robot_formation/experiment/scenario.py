@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -21,9 +21,20 @@ from robot_formation.components.node_parameters import (
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
+from robot_formation.experiment.path_check import PathCheck
+from robot_formation.experiment.path_plan import (
+    KNOWN_STEP,
+    STRAIGHT,
+    known_step,
+    path_start,
+    prediction_bounds,
+    with_room,
+)
+from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.parameters import (
+    PAIRS,
     ParameterError,
     check_as,
     flatten,
@@ -34,7 +45,7 @@ from robot_formation.parameters import (
     to_mapping,
 )
 from robot_formation.paths import config_dir
-from robot_formation.surface import SURFACES
+from robot_formation.surface import SURFACES, plate_size
 from robot_formation.system.yaml_files import YamlError, parse_yaml
 from robot_formation.vision.marker import MarkerKind
 
@@ -42,6 +53,8 @@ P = TypeVar("P")
 Settings = Mapping[str, Mapping[str, object]]
 """Parameters that differ from the defaults: by node, then by dotted name."""
 
+
+START = ("start_x_m", "start_y_m")
 
 FOLLOWS_FROM_SETUP = {
     "world": {
@@ -53,10 +66,13 @@ FOLLOWS_FROM_SETUP = {
         "start_heading_rad": "'heading_deg' of the scenario",
     },
     "block_detector": {"sensor": "'marker'"},
-    "leader": {"followers": "'followers'"},
-    "fine_tuner": {"done_listeners": "'followers'"},
+    "leader": {"followers": "'followers'", "seed": "'seed'", "room_m": "the plate's size"},
+    "fine_tuner": {"done_listeners": "'followers'", "blackouts": "'blackouts' of the scenario"},
 }
 """Parameters of nodes that follow from the setup, and what is set instead."""
+
+
+_START = "not given, a path other than straight starts so that all of it lies in the plate's middle"
 
 
 @dataclass(frozen=True)
@@ -66,10 +82,22 @@ class Setup:
     name: str = parameter("", "Name shown in reports")
     seed: int = parameter(0, "Seed of every random stream", low=0, high=2**63 - 1)
     followers: int = parameter(1, "Number of followers, each beside the one before", low=1, high=9)
-    start_x_m: float = parameter(0.763, "Start of the leader", unit="m", low=-10.0, high=100.0)
-    start_y_m: float = parameter(0.158, "Start of the leader", unit="m", low=-10.0, high=100.0)
+    start_x_m: float = parameter(0.763, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
+    start_y_m: float = parameter(0.158, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
     heading_deg: float = parameter(90.0, "Heading of the formation", unit="deg", low=-360.0, high=360.0)
     marker: MarkerKind = parameter(MarkerKind.COLOURS, "What the robots' markers carry and their cameras look for")
+    blackouts: PAIRS = parameter(
+        (), "Timesteps without cameras: pairs of first timestep and length, like [[12, 3]]", low=1, high=1000000
+    )
+
+    def __post_init__(self) -> None:
+        """Check that blackouts don't overlap."""
+        blind_timesteps(self.flat_blackouts, "'blackouts'")
+
+    @property
+    def flat_blackouts(self) -> tuple[int, ...]:
+        """The blackouts' numbers one after another, as the fine-tuner has them."""
+        return tuple(number for pair in self.blackouts for number in pair)
 
 
 @dataclass(frozen=True)
@@ -79,10 +107,12 @@ class Scenario:
     Attributes:
         setup: what a scenario says beside the nodes' parameters.
         settings: the parameters that it sets, from which it is made anew when something is changed.
+        given: which entries of the setup's start were given, and are not to be chosen for the path.
     """
 
     setup: Setup
     settings: Settings
+    given: frozenset[str]
     world: WorldNodeParameters
     overhead_tracker: OverheadTrackerNodeParameters
     drive: DriveParameters
@@ -106,8 +136,14 @@ class Scenario:
         found = self.node(kind)
         if isinstance(found, FineTunerNodeParameters):
             # The leader hears every follower, a follower the one on its left.
-            return replace(found, done_listeners=1 if robot == self.robots[-1] else 2)
+            found = replace(found, done_listeners=1 if robot == self.robots[-1] else 2)
+        if kind.name in KNOWN_STEP and (number := self.robots.index(robot)) > 1:
+            values = {**to_mapping(found), **self._known_step(kind.name, number)}
+            return from_mapping(kind.parameter_class(), values, where=kind.name)
         return found
+
+    def _known_step(self, kind: str, number: int) -> dict[str, object]:
+        return known_step(kind, self.leader, number, self.fine_tuner.formation_distance_m, self.settings.get(kind, {}))
 
     def by_node(self) -> dict[str, dict[str, object]]:
         """List all parameters as plain values: by node, then by dotted name."""
@@ -125,19 +161,49 @@ class Scenario:
         Raises:
             FormationError: naming what is wrong.
         """
+        last = max(blind_timesteps(self.setup.flat_blackouts), default=0)
+        if last > self.leader.timesteps:
+            raise ParameterError(
+                f"'blackouts' last until timestep {last}, but the run has only {self.leader.timesteps} timesteps; "
+                "shorten them or raise 'leader.timesteps'"
+            )
         fastest = self.world.motor.max_speed_rad_s
         if self.drive.wheel_speed_rad_s > fastest:
             raise ParameterError(
                 f"drive: 'wheel_speed_rad_s' is {self.drive.wheel_speed_rad_s}, more than the world's "
                 f"'motor.max_speed_rad_s' of {fastest}: every move would be refused"
             )
+        if self.leader.path != STRAIGHT:
+            self.check_path()  # says more than that a start that was chosen for it is off the plate
         self.world.check()
         check_curves(self.drive, self.world, self.robots)
         check_camera(self.fine_tuner, self.world)
+        if self.leader.path == STRAIGHT:
+            self.check_path()
+
+    @property
+    def plate_m(self) -> float:
+        """Edge of the square plate."""
+        return plate_size(self.world.surface, self.world.surface_parameters)
+
+    def check_path(self, leader: LeaderParameters | None = None) -> None:
+        """Check that the leader's path can be made and followed; or that of another leader, say with another seed.
+
+        Raises:
+            ParameterError: naming the robot, the timestep and what would fit.
+        """
+        chosen = not any(entry in self.given for entry in START)
+        distance_m = self.fine_tuner.formation_distance_m
+        PathCheck(leader or self.leader, self.world, self.drive, distance_m, self.setup.followers, chosen).require()
 
 
-def build(setup: Setup, settings: Settings) -> Scenario:
+def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> Scenario:
     """Make every node's parameters: the defaults, then the scenario's settings, then what follows from the setup.
+
+    Args:
+        setup: what is said beside the nodes' parameters.
+        settings: the nodes' parameters that are set.
+        given: which entries of the setup's start are given; the others follow from the path, unless it is straight.
 
     Raises:
         ParameterError: on an unknown name, a wrong type or a value out of range.
@@ -147,20 +213,35 @@ def build(setup: Setup, settings: Settings) -> Scenario:
         values = {**node_defaults(kind, setup.marker), **settings.get(kind, {}), **follows}
         return from_mapping(cls, values, where=kind)
 
-    fine_tuner = made(FineTunerNodeParameters, "fine_tuner")
-    world = made(WorldNodeParameters, "world", **_starts(setup, fine_tuner.formation_distance_m))
+    leader = made(LeaderParameters, "leader", followers=_robots(setup)[1:], seed=setup.seed)
+    distance_m = made(FineTunerNodeParameters, "fine_tuner").formation_distance_m
+    ground = made(WorldNodeParameters, "world")
+    x_m, y_m = path_start(leader, setup.followers, setup.heading_deg, distance_m, ground) or (
+        setup.start_x_m,
+        setup.start_y_m,
+    )
+    setup = replace(
+        setup,
+        start_x_m=setup.start_x_m if "start_x_m" in given else x_m,
+        start_y_m=setup.start_y_m if "start_y_m" in given else y_m,
+    )
+    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m))
     own = settings.get("overhead_tracker", {})
     known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
+    bounds = prediction_bounds(leader, distance_m, ground)
+    bounds = {name: value for name, value in bounds.items() if name not in settings.get("fine_tuner", {})}
+    first = {kind: known_step(kind, leader, 1, distance_m, settings.get(kind, {})) for kind in KNOWN_STEP}
     return Scenario(
         setup,
         settings,
+        frozenset(given),
         world,
         made(OverheadTrackerNodeParameters, "overhead_tracker", **known),
         made(DriveParameters, "drive"),
         made(BlockDetectorNodeParameters, "block_detector"),
-        made(PredictorParameters, "predictor"),
-        fine_tuner,
-        made(LeaderParameters, "leader", followers=_robots(setup)[1:]),
+        made(PredictorParameters, "predictor", **first["predictor"]),
+        made(FineTunerNodeParameters, "fine_tuner", blackouts=setup.flat_blackouts, **first["fine_tuner"], **bounds),
+        with_room(leader, world, setup.followers, distance_m),
     )
 
 
@@ -231,7 +312,7 @@ def load(path: Path) -> Scenario:
         if not isinstance(section, Mapping):
             raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {shown(section)}")
         sections[kind] = _checked(kind, flatten(section, where=f"{path}: {kind}"), where=f"{path}: {kind}")
-    return build(setup, sections)
+    return build(setup, sections, [entry for entry in START if entry in content])
 
 
 def _checked(kind: str, section: Mapping[str, object], *, where: str) -> dict[str, object]:
@@ -311,7 +392,10 @@ def with_values(scenario: Scenario, values: Sequence[tuple[str, object]], *, sou
         else:
             setup[key] = value
     checked = {kind: _checked(kind, section, where=f"{source}: {kind}") for kind, section in sections.items()}
-    return build(from_mapping(Setup, setup, where=source), checked)
+    # A start is that of the path that it was given with.
+    same_path = checked.get("leader", {}).get("path", scenario.leader.path) == scenario.leader.path
+    given = {entry for entry in START if entry in dict(values) or (same_path and entry in scenario.given)}
+    return build(from_mapping(Setup, setup, where=source), checked, given)
 
 
 def with_surface(scenario: Scenario, surface: str) -> Scenario:

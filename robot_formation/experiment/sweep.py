@@ -1,4 +1,4 @@
-"""Many in-process runs over tracks, surfaces, predictors and seeds; each yields one row of a table.
+"""Many in-process runs over tracks, paths, surfaces, predictors and seeds; each yields one row of a table.
 
 The table is a CSV file that grows row by row, so that a sweep which was stopped goes on where it was.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -22,10 +22,12 @@ from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.noise_floor import IDEAL, IdealRun
+from robot_formation.experiment.path_plan import STRAIGHT
 from robot_formation.json_values import JsonObject
 from robot_formation.koopman.predictors import NAMES
+from robot_formation.leader.paths import PATHS, Teleop
 from robot_formation.names import Message
-from robot_formation.parameters import suggestion
+from robot_formation.parameters import ParameterError, suggestion
 from robot_formation.surface import SURFACES
 
 # The comparison's common ground unless --set says otherwise: the paper's fine-tuner, pictures only when waited for.
@@ -46,6 +48,7 @@ class Task(NamedTuple):
     surface: str
     predictor: str
     seed: int
+    path: str = STRAIGHT
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class Row:
     surface: str
     predictor: str
     seed: int
+    path: str
     outcome: str
     timesteps: int
     correction_m: float | None
@@ -70,7 +74,7 @@ class Row:
     @property
     def task(self) -> Task:
         """The run that it is of."""
-        return Task(self.track, self.surface, self.predictor, self.seed)
+        return Task(self.track, self.surface, self.predictor, self.seed, self.path)
 
     @property
     def lost(self) -> bool:
@@ -87,6 +91,7 @@ class Plan:
     predictors: tuple[str, ...]
     seeds: tuple[int, ...]
     settings: tuple[str, ...] = ()
+    paths: tuple[str, ...] = (STRAIGHT,)
 
     def check(self) -> None:
         """Check every name and setting before anything is run.
@@ -98,6 +103,7 @@ class Plan:
             ("track", self.tracks, scenarios.track_names()),
             ("surface", self.surfaces, list(SURFACES)),
             ("predictor", self.predictors, [*NAMES, *IDEAL]),
+            ("path", self.paths, [name for name in PATHS if name != Teleop.name]),
         ):
             if not chosen:
                 raise SweepError(f"no {kind} is given")
@@ -109,11 +115,31 @@ class Plan:
         if not self.seeds:
             raise SweepError("no seed is given; --seeds 0:200 is from 0 to 199")
         for setting in self.settings:
-            if (key := setting.partition("=")[0]) in ("predictor.name", "world.surface", "seed"):
-                raise SweepError(f"--set {key}: a sweep sets it itself; use --predictors, --surfaces or --seeds")
+            if (key := setting.partition("=")[0]) in ("predictor.name", "world.surface", "seed", "leader.path"):
+                raise SweepError(
+                    f"--set {key}: a sweep sets it itself; use --predictors, --surfaces, --seeds or --paths"
+                )
+        plates: set[tuple[str, str, float]] = set()
         for track in self.tracks:
             for surface in self.surfaces:
-                build(Task(track, surface, self.predictors[0], self.seeds[0]), self.settings).check()
+                for path in self.paths:
+                    scenario = build(Task(track, surface, self.predictors[0], self.seeds[0], path), self.settings)
+                    scenario.check()
+                    plate = (track, path, scenario.plate_m)
+                    if plate not in plates:
+                        self._check_seeds(scenario)
+                    plates.add(plate)
+
+    def _check_seeds(self, scenario: scenarios.Scenario) -> None:
+        """Check the path with every seed: a random phase changes it, and with it the start and the steps."""
+        first = scenario.leader.make_path()
+        for seed in self.seeds[1:]:
+            leader = replace(scenario.leader, seed=seed)
+            if leader.make_path() != first:
+                try:
+                    scenario.check_path(leader)
+                except ParameterError as error:
+                    raise SweepError(f"seed {seed}: {error}") from None
 
     def conditions(self) -> JsonObject:
         """List the conditions of all runs by name, as those of a single run."""
@@ -125,9 +151,10 @@ class Plan:
         """Yield every run; all predictors of a seed together, so that an unfinished sweep has pairs."""
         for seed in self.seeds:
             for track in self.tracks:
-                for surface in self.surfaces:
-                    for predictor in self.predictors:
-                        yield Task(track, surface, predictor, seed)
+                for path in self.paths:
+                    for surface in self.surfaces:
+                        for predictor in self.predictors:
+                            yield Task(track, surface, predictor, seed, path)
 
 
 def build(task: Task, settings: Sequence[str]) -> scenarios.Scenario:
@@ -137,8 +164,11 @@ def build(task: Task, settings: Sequence[str]) -> scenarios.Scenario:
         FormationError: naming what is misspelt or out of range.
     """
     scenario = scenarios.with_surface(scenarios.load_track(task.track), task.surface)
+    path = [] if task.path == STRAIGHT else [f"leader.path={task.path}"]
     predictor = {"ideal": "previous", "ideal+close": "formation"}.get(task.predictor, task.predictor)
-    return scenarios.override(scenario, [*CONDITIONS, *settings, f"predictor.name={predictor}", f"seed={task.seed}"])
+    return scenarios.override(
+        scenario, [*CONDITIONS, *settings, *path, f"predictor.name={predictor}", f"seed={task.seed}"]
+    )
 
 
 def run_task(task: Task, settings: Sequence[str]) -> Row:
@@ -156,12 +186,13 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
     try:
         analysis = analyse(run_in_memory(build(task, settings), make_run))
     except FormationError as error:
-        run = f"track {task.track}, surface {task.surface}, predictor {task.predictor}, seed {task.seed}"
+        path = "" if task.path == STRAIGHT else f", path {task.path}"
+        run = f"track {task.track}{path}, surface {task.surface}, predictor {task.predictor}, seed {task.seed}"
         raise SweepError(f"{run}: {error}") from None
     totals = analysis.followers[0].totals
     # A sum of nothing is an integer 0, which the table would give back as another text.
     quantities: JsonObject = {
-        field.name: None if totals[field.name] is None else float(totals[field.name]) for field in fields(Row)[6:]
+        field.name: None if totals[field.name] is None else float(totals[field.name]) for field in fields(Row)[7:]
     }
     return Row(
         *task,
@@ -188,7 +219,11 @@ class Table:
         folder.mkdir(parents=True, exist_ok=True)
         write_record(record, asdict(plan))
         self._table = ResumableTable(
-            folder / RUNS_NAME, Row, SweepError, "no table of a sweep's runs; choose another --out"
+            folder / RUNS_NAME,
+            Row,
+            SweepError,
+            "no table of a sweep's runs; choose another --out",
+            added={"path": STRAIGHT},
         )
         self.rows: dict[Task, Row] = {}
         if self._table.path.exists():

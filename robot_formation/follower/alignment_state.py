@@ -15,6 +15,8 @@ class AlignmentState(Enum):
     """A timestep of the collection phase begins with its first move."""
     PREDICT = "predict"
     """A timestep begins with its prediction move."""
+    BLIND = "blind"
+    """The prediction move of a timestep without the camera is sent: it is the timestep's only one."""
     CORRECT = "correct"
     """A correction is sent."""
     HOLD = "hold"

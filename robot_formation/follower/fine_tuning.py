@@ -15,11 +15,15 @@ from robot_formation.alignment.mode import AlignmentMode, Decision, Verdict
 from robot_formation.alignment.paper_mode import AlignmentParameters, PaperMode
 from robot_formation.alignment.precise.precise_mode import PreciseAlignment, PreciseParameters
 from robot_formation.follower.alignment_state import AlignmentState, State
+from robot_formation.follower.blind_driving import blind_timesteps, out_of_view
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.uncertain_motion import UncertainMotion
 from robot_formation.parameters import Choice, ParameterError, parameter
 from robot_formation.vision.pixy2.block import Block
 
 COLLECTION_TIMESTEPS = 3
+_UNTOLD = (0.01**2, 0.0, 0.0, 0.0, 0.01**2, 0.0, 0.0, 0.0, 0.02**2)
+"""Covariance of the neighbour's step about a command, which has the actuation bias in it: (x, y, yaw) in m and rad."""
 
 
 class AlignmentModeName(Choice):
@@ -55,8 +59,14 @@ class FineTunerParameters:
 
     mode: AlignmentModeName = parameter(AlignmentModeName.PRECISE, "How the camera's blocks are used")
     first_step_m: float = parameter(
-        0.05, "Displacement of timestep 1: the leader's own step, known beforehand", unit="m", low=0.0, high=0.2
+        0.05,
+        "Displacement of timestep 1 along v, known beforehand: a scenario takes it from the leader's path",
+        unit="m",
+        low=-0.2,
+        high=0.2,
     )
+    first_step_u_m: float = parameter(0.0, "The same along u", unit="m", low=-0.1, high=0.1)
+    first_turn_rad: float = parameter(0.0, "Turn of timestep 1, known beforehand too", unit="rad", low=-1.1, high=1.1)
     formation_distance_m: float = parameter(
         FORMATION_DISTANCE_M,
         "Distance beside the neighbour that is kept, between the origins of base_link, along u",
@@ -65,9 +75,25 @@ class FineTunerParameters:
         high=2.0,
     )
     # The bodies are 8 cm apart in a formation of 32 cm: a wild forecast must not push the neighbour.
-    max_v_m: float = parameter(0.1, "Longest prediction move along v; longer ones are cut", unit="m", low=0.0, high=0.2)
+    max_v_m: float = parameter(
+        0.1,
+        "Longest prediction move along v; longer ones are cut. A scenario raises it where the path isn't straight",
+        unit="m",
+        low=0.0,
+        high=0.2,
+    )
     max_u_m: float = parameter(
-        0.05, "Longest prediction move along u; longer ones are cut", unit="m", low=0.0, high=0.1
+        0.05,
+        "Longest prediction move along u; longer ones are cut. A scenario raises it to the bodies' gap likewise",
+        unit="m",
+        low=0.0,
+        high=0.1,
+    )
+    max_turn_rad: float = parameter(
+        0.35, "Largest turn of the prediction move; larger ones are cut", unit="rad", low=0.0, high=1.0
+    )
+    blackouts: tuple[int, ...] = parameter(
+        (), "Timesteps without the camera: pairs of first timestep and length, one after another", low=1, high=1000000
     )
     calibration_file: str = parameter(
         "", "YAML file of 'formation calibrate vision': its values go before those of 'alignment'; empty: none"
@@ -77,7 +103,8 @@ class FineTunerParameters:
     precise: PreciseParameters = PreciseParameters()
 
     def __post_init__(self) -> None:
-        """Check that the mode can keep the formation distance."""
+        """Check that the mode can keep the formation distance, and the blackouts."""
+        blind_timesteps(self.blackouts)
         if self.mode is AlignmentModeName.PAPER:
             self.alignment.at_distance(self.formation_distance_m)
         least_m = self.precise.approach.body_width_m + self.precise.approach.clearance_m
@@ -104,12 +131,12 @@ class RequestFrames:
 
 @dataclass(frozen=True)
 class Report:
-    """The timestep's net displacement, what is left by the camera's estimate (None: Target face not seen), and what the
-    displacement would have been had the prediction move gone as commanded (None: its end is unknown).
+    """The timestep's net displacement, what is left by the camera's estimate (None: Target face not seen, or blind),
+    and what the displacement would have been had the prediction move gone as commanded (None: its end is unknown).
     """
 
     displacement: Motion
-    residual: Motion | None
+    residual: UncertainMotion | None
     commanded: Motion | None
 
 
@@ -157,7 +184,9 @@ class FineTuner:
         self._asked = Motion()
         self._out_of_view = False
         self._resent = 0
+        self._blind_timesteps = blind_timesteps(parameters.blackouts)
         self._prediction: Motion | None = None
+        self._step: UncertainMotion | None = None  # the neighbour's next one, as forecast
         self._planned_move: Motion | None = None  # the prediction move, until it has ended
         self._actuation_error: Motion | None = None
         self._frames: list[Sequence[Block]] = []
@@ -187,13 +216,15 @@ class FineTuner:
         if not motion.finite:
             return [
                 Warn("a 'moved' that is not finite is ignored: the displacement of this move is lost"),
-                *self._look(),
+                *(self._report(None) if self._blind else self._look()),
             ]
         if planned is not None:
-            self._actuation_error = Motion(motion.x_m - planned.x_m, motion.y_m - planned.y_m)
+            self._actuation_error = Motion(
+                motion.x_m - planned.x_m, motion.y_m - planned.y_m, motion.yaw_rad - planned.yaw_rad
+            )
         self._displacement = self._displacement.then(motion)
         self._alignment.moved(self._asked, motion)
-        return self._look()
+        return self._report(None) if self._blind else self._look()
 
     def frame(self, blocks: Sequence[Block], stamp_ns: int) -> list[Action]:
         """The camera's blocks of one frame. Only frames later than the last fact count."""
@@ -221,8 +252,14 @@ class FineTuner:
         missing = self._frames_wanted - len(self._frames)
         return [Warn(f"{missing} frames of a look are missing: asked for again"), RequestFrames(missing)]
 
-    def prediction(self, mean: Motion | None) -> list[Action]:
-        """The predictor's displacement for the next timestep, answered to this report; None if it has none."""
+    def prediction(self, mean: Motion | None, step: UncertainMotion | None = None) -> list[Action]:
+        """The predictor's answer to this report.
+
+        Args:
+            mean: what to command as the next timestep's prediction move; None if it has none.
+            step: what the neighbour's next step is expected to do to the formation position, in that position's frame;
+                None if the predictor doesn't tell, so that it follows from `mean`.
+        """
         if self._phase is not Phase.PREDICTION:
             return [Warn("a prediction that nobody asked for is ignored")]
         actions: list[Action] = []
@@ -230,13 +267,20 @@ class FineTuner:
             self._prediction = mean
         else:
             actions.append(Warn("no finite prediction: the previous displacement is repeated"))
-            self._prediction = self._previous
+            self._prediction, step = self._previous, None
+        self._step = step if step is not None and step.finite else self._step_of(self._prediction)
         return [*actions, *self._finish()]
+
+    def _step_of(self, command: Motion) -> UncertainMotion:
+        """Take a command for the motion to the next formation position, from what is left to the present one."""
+        left = self._alignment.ahead() if self._blind else self._alignment.offset()
+        return UncertainMotion((left.mean if left else Motion()).inverse().then(command), _UNTOLD)
 
     def _begin(self) -> list[Action]:
         if self._neighbour < self.timestep:
             return []
-        self._alignment.restart(self.timestep)
+        step = UncertainMotion(self._first_step) if self.timestep == 1 else self._step
+        self._alignment.restart(self.timestep, step)
         self._displacement = Motion()
         self._actuation_error = None
         if self.timestep == 0:
@@ -246,23 +290,48 @@ class FineTuner:
     def _go(self) -> list[Action]:
         """Make the prediction move, and take a known heading error out with it."""
         wish = self._planned()
-        motion = Motion.from_uv(
-            max(-self._p.max_u_m, min(self._p.max_u_m, wish.u_m)), max(-self._p.max_v_m, min(self._p.max_v_m, wish.v_m))
+        turn = self._alignment.turn(wish.yaw_rad)
+        motion = Motion(
+            _clip(wish.x_m, self._p.max_v_m), _clip(wish.y_m, self._p.max_u_m), _clip(turn, self._p.max_turn_rad)
         )
+        cut = (motion.x_m, motion.y_m, motion.yaw_rad) != (wish.x_m, wish.y_m, turn)
+        blind = []
+        if self._blind:
+            self._out_of_view = True
+            expected = self._alignment.ahead()
+            end = None if expected is None else expected.after(motion)
+            reason = out_of_view(end, self._p.formation_distance_m, self._p.precise.approach)
+            blind = [State(AlignmentState.BLIND, f"holding still: {reason}" if reason else "driving by forecast")]
+            motion = Motion() if reason else motion
         self._planned_move = motion
         collecting = self.timestep <= COLLECTION_TIMESTEPS
-        move = Motion(motion.x_m, motion.y_m, self._alignment.turn())
         actions: list[Action] = [
             State(AlignmentState.COLLECT if collecting else AlignmentState.PREDICT),
-            *self._move(move),
+            *self._move(motion),
+            *blind,
         ]
-        if (motion.u_m, motion.v_m) != (wish.u_m, wish.v_m):
-            actions.insert(0, Warn(f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"))
+        if cut:
+            text = f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m is too long: cut"
+            if abs(turn) > self._p.max_turn_rad:
+                text = (
+                    f"prediction (u {wish.u_m:.3f}, v {wish.v_m:.3f}) m with a turn of {turn:.3f} rad is too long: cut"
+                )
+            actions.insert(0, Warn(text))
         return actions
+
+    @property
+    def _first_step(self) -> Motion:
+        p = self._p
+        return Motion(p.first_step_m, 0.0 - p.first_step_u_m, p.first_turn_rad)
+
+    @property
+    def _blind(self) -> bool:
+        """Whether the camera is not used in this timestep."""
+        return self.timestep in self._blind_timesteps
 
     def _planned(self) -> Motion:
         if self.timestep == 1:
-            return Motion(x_m=self._p.first_step_m)
+            return self._first_step
         if self.timestep <= COLLECTION_TIMESTEPS or self._prediction is None:
             return self._previous
         return self._prediction
@@ -300,12 +369,15 @@ class FineTuner:
             actions.append(Warn(decision.reason))
         if self.timestep == 0:
             return [*actions, *self._finish()]
+        return [*actions, *self._report(self._alignment.offset())]
+
+    def _report(self, residual: UncertainMotion | None) -> list[Action]:
         self._phase = Phase.PREDICTION
-        self._previous = Motion(self._displacement.x_m, self._displacement.y_m)
+        total = self._previous = self._displacement
         commanded = None
         if (error := self._actuation_error) is not None:
-            commanded = Motion(self._displacement.x_m - error.x_m, self._displacement.y_m - error.y_m)
-        return [*actions, Report(self._displacement, self._alignment.offset(), commanded)]
+            commanded = Motion(total.x_m - error.x_m, total.y_m - error.y_m, total.yaw_rad - error.yaw_rad)
+        return [Report(total, residual, commanded)]
 
     def _move(self, motion: Motion) -> list[Action]:
         self._phase = Phase.MOVE
@@ -319,7 +391,11 @@ class FineTuner:
         return [Done(finished), *self._begin()]
 
 
+def _clip(value: float, bound: float) -> float:
+    return max(-bound, min(bound, value))
+
+
 def _mode(parameters: FineTunerParameters) -> AlignmentMode:
     if parameters.mode is AlignmentModeName.PAPER:
         return PaperMode(parameters.alignment.at_distance(parameters.formation_distance_m))
-    return PreciseAlignment(parameters.precise, parameters.first_step_m, parameters.formation_distance_m)
+    return PreciseAlignment(parameters.precise, parameters.formation_distance_m)

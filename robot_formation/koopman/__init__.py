@@ -15,6 +15,7 @@ from robot_formation.koopman.dictionaries import (
 from robot_formation.koopman.edmd import EDMD, Errors
 from robot_formation.koopman.linear_algebra import KoopmanError, Regularization
 from robot_formation.koopman.online_dmd import OnlineDMD
+from robot_formation.koopman.quality import EigenvalueQuality, consistency_index, eigenvalue_qualities
 from robot_formation.koopman.radial_basis import RadialBasis
 from robot_formation.koopman.spectrum import Spectrum, spectrum
 from robot_formation.koopman.windowed_dmd import WindowedDMD
@@ -25,6 +26,7 @@ __all__ = [
     "Constant",
     "DelayEmbedding",
     "Dictionary",
+    "EigenvalueQuality",
     "Errors",
     "Identity",
     "Inputs",
@@ -38,5 +40,7 @@ __all__ = [
     "Rows",
     "Spectrum",
     "WindowedDMD",
+    "consistency_index",
+    "eigenvalue_qualities",
     "spectrum",
 ]

@@ -32,6 +32,7 @@ class Argument:
 ARGUMENTS = {
     "track": Argument("two", "preset track: see 'formation list tracks'"),
     "scenario": Argument("", "scenario file, instead of a track"),
+    "path": Argument("", "the leader's path: see 'formation list paths'; empty: the scenario's"),
     "surface": Argument("", "surface: see 'formation list surfaces'; empty: the scenario's"),
     "predictor": Argument("", "predictor: see 'formation list predictors'; empty: the scenario's"),
     "seed": Argument("", "seed of every random stream; empty: the scenario's"),
@@ -61,6 +62,7 @@ def scenario_of(values: Mapping[str, str]) -> Scenario:
     if values["surface"]:
         scenario = scenarios.with_surface(scenario, values["surface"])
     for name, key in (
+        ("path", "leader.path"),
         ("predictor", "predictor.name"),
         ("seed", "seed"),
         ("camera", "world.camera.mode"),

@@ -61,7 +61,7 @@ class ForkServer:
     def __enter__(self) -> ForkServer:
         self._stack = contextlib.ExitStack()
         with self._stack:
-            self._stack.enter_context(_adopting_orphans())
+            self._stack.enter_context(adopting_orphans())
             with self._log.open("wb") as log:
                 process = subprocess.Popen(
                     [sys.executable, "-m", "robot_formation.launching.fork_server", str(os.getpid())],
@@ -128,7 +128,7 @@ class ForkServer:
 
 
 @contextlib.contextmanager
-def _adopting_orphans() -> Iterator[None]:
+def adopting_orphans() -> Iterator[None]:
     """Become the parent of processes below this one whose own parent ends, for a while."""
     libc, before = ctypes.CDLL(None), ctypes.c_int()
     libc.prctl(_PR_GET_CHILD_SUBREAPER, ctypes.byref(before))

@@ -23,6 +23,7 @@ from robot_formation.launching.fork_server import ForkServer, NodeNotStartedErro
 from robot_formation.launching.outcome import recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
+from robot_formation.leader.paths import Teleop
 from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, is_of_domain
 from robot_formation.system.signal_handling import SignalCounter
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from robot_formation.nodes.progress.monitor import Monitor
 
 _POLL_S = 0.05
+_A_PERSONS_PATIENCE_S = 86400.0
+"""A leader that a person drives may stand for a day."""
 _REMIND_S = 15.0  # without a line of progress
 _CLEANING_ROUNDS = 6
 _CAUGHT_UP_REPORTS, _CATCH_UP_S = 3, 10.0
@@ -54,6 +57,14 @@ def _clean_shared_memory(domain: int) -> None:
         if not any(is_of_domain(group, domain) for group in fast_dds_files()):
             return
         time.sleep(_POLL_S)
+
+
+def _how_to_drive(domain: int) -> str:
+    """Return the command with which a person drives the leader of this run."""
+    return (
+        f"drive the leader: ROS_DOMAIN_ID={domain} ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ros2 run "
+        "teleop_twist_keyboard teleop_twist_keyboard --ros-args -p stamped:=true -r cmd_vel:=/leader/cmd_vel"
+    )
 
 
 @dataclass
@@ -99,6 +110,8 @@ class Launcher:
             began = time.monotonic()
             try:
                 environment = node_environment(domain, folder)
+                if self.scenario.leader.path == Teleop.name:
+                    self._tell(_how_to_drive(domain))
                 result.exit_code, result.reason = self._drive(folder, environment, result)
             finally:
                 ended = time.monotonic()
@@ -178,6 +191,8 @@ class Launcher:
                     monitor.spin(_POLL_S)
 
     def _patience_s(self) -> float:
+        if self.scenario.leader.path == Teleop.name:
+            return _A_PERSONS_PATIENCE_S
         factor = self.scenario.world.real_time_factor
         return self.silence_s / (min(factor, 1.0) or 1.0)
 

@@ -93,6 +93,7 @@ def run_metadata(scenario: Scenario) -> dict[str, str]:
         "scenario": scenario.setup.name,
         "seed": str(scenario.setup.seed),
         "predictor": scenario.predictor.name,
+        "path": scenario.leader.path,
         "surface": world.surface,
         "surface_parameters": json.dumps(dict(text.split("=", 1) for text in world.surface_parameters)),
         "timesteps": str(scenario.leader.timesteps),

@@ -1,16 +1,17 @@
-"""The leader: one straight step, then wait for the formation; a state machine without input or output.
+"""The leader: one step of its path, then wait for the formation; a state machine without input or output.
 
-The leader drives with a constant wheel rotation per timestep (paper, "Experimental setups"); it starts the next
-timestep on the followers' bare ready ticks, which carry no pose and no velocity.
+The paper's leader drives straight with a constant wheel rotation per timestep ("Experimental setups"); it starts the
+next timestep on the followers' bare ready ticks, which carry no pose and no velocity.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from robot_formation.geometry.se2 import Motion
-from robot_formation.parameters import parameter
+from robot_formation.leader.paths import PATHS, Given, LeaderPath, Room, make_path
+from robot_formation.parameters import ParameterError, parameter
 
 
 @dataclass(frozen=True)
@@ -19,9 +20,45 @@ class LeaderParameters:
 
     timesteps: int = parameter(20, "Number of timesteps to drive", low=1, high=100000)
     step_m: float = parameter(
-        0.05, "Forward displacement asked of the drive per timestep", unit="m", low=0.001, high=0.2
+        0.05,
+        "Displacement asked of the drive per timestep, where the path's own step_m isn't set",
+        unit="m",
+        low=0.001,
+        high=0.2,
+    )
+    path: str = parameter("straight", "Name of the path (see 'formation list paths')", known=tuple(PATHS))
+    path_parameters: tuple[str, ...] = parameter((), "The path's own parameters, each as 'name=value'")
+    seed: int = parameter(
+        0, "Seed of the path: its phase where none is given, a random walk's steps", low=0, high=2**63 - 1
+    )
+    room_m: tuple[float, ...] = parameter(
+        (),
+        "How far a random walk may go from the start: ahead, back, left, right; empty: anywhere",
+        unit="m",
+        low=0.0,
+        high=1000.0,
     )
     followers: tuple[str, ...] = parameter(("follower_1",), "Robots whose done ticks are waited for")
+
+    def __post_init__(self) -> None:
+        """Check that the room has four sides."""
+        if len(self.room_m) not in (0, 4):
+            raise ParameterError("leader: 'room_m' needs four distances: ahead, back, left and right of the start")
+
+    def make_path(self) -> LeaderPath:
+        """Build the path that the parameters name.
+
+        Raises:
+            ParameterError: if there is none of this name, or its own parameters can't be used.
+        """
+        room = Room(*self.room_m) if self.room_m else Room()
+        path = make_path(self.path, self.path_parameters, Given(self.step_m, self.seed, room))
+        if path.timesteps is not None and path.timesteps < self.timesteps:
+            raise ParameterError(
+                f"path '{self.path}' has {path.timesteps} timesteps, fewer than leader.timesteps = {self.timesteps}; "
+                f"set leader.timesteps={path.timesteps}"
+            )
+        return path
 
 
 @dataclass(frozen=True)
@@ -40,10 +77,16 @@ class Leader:
     """Counts timesteps: waits for every follower's tick t-1, moves, ticks t, until the tour ends.
 
     With `paused` set no new timestep begins; `resume` goes on where it stopped.
+
+    Args:
+        parameters: what the leader does.
+        motion: of a timestep, instead of the path's; None while it isn't known, and the timestep doesn't begin.
     """
 
-    def __init__(self, parameters: LeaderParameters) -> None:
+    def __init__(self, parameters: LeaderParameters, motion: Callable[[int], Motion | None] | None = None) -> None:
         self._parameters = parameters
+        self.path = parameters.make_path()
+        self._motion = motion or self.path.motion
         self._ready: dict[str, int] = dict.fromkeys(parameters.followers, -1)
         self._moving = False
         self.timestep = 0
@@ -73,6 +116,10 @@ class Leader:
         self._moving = False
         return LeaderAction(done=self.timestep)
 
+    def go(self) -> LeaderAction:
+        """Begin the next timestep if all are ready for it and its motion is known now."""
+        return self._next()
+
     def resume(self) -> LeaderAction:
         """Go on after `paused`."""
         self.paused = False
@@ -84,6 +131,9 @@ class Leader:
         if self.timestep == self._parameters.timesteps:
             self.finished = True
             return LeaderAction(finished=True)
+        motion = self._motion(self.timestep + 1)
+        if motion is None:
+            return NOTHING
         self.timestep += 1
         self._moving = True
-        return LeaderAction(move=Motion(x_m=self._parameters.step_m))
+        return LeaderAction(move=motion)

@@ -6,13 +6,13 @@ A new surface is a frozen dataclass in a file of its own whose fields are made w
 
 from __future__ import annotations
 
+import typing
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-from robot_formation.errors import shown
 from robot_formation.json_values import Json
-from robot_formation.parameters import ParameterError, from_mapping, specs, suggestion
+from robot_formation.parameters import ParameterError, check, from_mapping, read_texts, specs, suggestion
 from robot_formation.surface.base import PLATE_SIZE_M, GradientNormal, Surface
 from robot_formation.surface.bowl import Bowl
 from robot_formation.surface.elliptic_bowl import EllipticBowl
@@ -37,6 +37,7 @@ __all__ = [
     "Saddle",
     "Surface",
     "make_surface",
+    "plate_size",
     "surface_from_texts",
 ]
 
@@ -66,20 +67,20 @@ def surface_from_texts(name: str, texts: Sequence[str]) -> Surface:
     Raises:
         ParameterError: as `make_surface`, and on a text that is no name and value of the parameter's type.
     """
-    known = specs(_kind(name))
-    values: dict[str, Json] = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
-        if not equals:
-            raise ParameterError(f"surface '{name}': its parameters are texts like 'size_m=2.0', not {shown(text)}")
-        if key in known and known[key].type is str:
-            values[key] = value
-            continue
-        try:
-            values[key] = float(value)
-        except ValueError:
-            raise ParameterError(f"surface '{name}': '{key}' needs a number, not {shown(value)}") from None
+    values = read_texts(_kind(name), texts, where=f"surface '{name}'", example="size_m=2.0")
     return make_surface(name, values)
+
+
+def plate_size(name: str, texts: Sequence[str] = ()) -> float:
+    """Return the edge of a surface's plate, metres, without building the surface.
+
+    Raises:
+        ParameterError: as `surface_from_texts`, as far as names and texts go.
+    """
+    kind = _kind(name)
+    values = read_texts(kind, texts, where=f"surface '{name}'", example="size_m=2.0")
+    spec = specs(kind)["size_m"]
+    return float(typing.cast(float, check(spec, values.get("size_m", spec.default), where=f"surface '{name}'")))
 
 
 def _kind(name: str) -> type[Any]:

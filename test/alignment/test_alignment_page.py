@@ -24,7 +24,8 @@ class Watched:
 
     def __init__(self, mode: str) -> None:
         look = {"frames": 1, "stable_frames": 1}
-        self.tuner = FineTuner(from_mapping(FineTunerParameters, {"mode": mode, "look": look}, where="test"))
+        values = {"mode": mode, "look": look, "blackouts": [2, 1]}
+        self.tuner = FineTuner(from_mapping(FineTunerParameters, values, where="test"))
         self.seen: set[tuple[str, str, str]] = set()
         self.now_ns = 0
 
@@ -81,6 +82,9 @@ def observed() -> set[tuple[str, str, str]]:
         run.timestep(1)
         run.event("prediction", partial(run.tuner.prediction, Motion(0.05)))
         run.tick(2)
+        run.moved(Motion(0.05))
+        run.event("prediction", partial(run.tuner.prediction, Motion(0.05)))
+        run.tick(3)
         run.moved(Motion(0.02))
         run.frame(state_of(x_m=0.03))
         run.moved(Motion(0.03))

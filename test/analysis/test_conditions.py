@@ -15,6 +15,7 @@ def test_conditions_come_out_of_what_a_run_says_of_itself() -> None:
     assert facts == {
         "seed": 7,
         "predictor": "formation",
+        "path": "straight",
         "surface": "bowl",
         "conditions": {
             "mode": "paper",

@@ -43,6 +43,7 @@ def log_of(
         displacements,
         unknown if residuals is None else np.array(residuals, dtype=float),
         unknown if commanded is None else np.array(commanded, dtype=float),
+        np.zeros(len(displacements)),
     )
 
 

@@ -34,7 +34,11 @@ ROW_KEYS = [
     "movements",
     "formation_error_m",
     "heading_error_rad",
+    "predicted_turn_rad",
+    "moved_turn_rad",
     "correction_turn_rad",
+    "residual_turn_rad",
+    "blind",
     "moves_by_axis",
     "moves_by_kind",
 ]

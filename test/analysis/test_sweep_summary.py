@@ -5,7 +5,7 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -31,6 +31,7 @@ class Run:
     movements_per_timestep: float | None = 1.5
     formation_error_rmse_m: float | None = 0.01
     heading_error_rmse_rad: float | None = 0.03
+    path: ClassVar[str] = "straight"
 
 
 def runs_of(predictor: str, corrections: Sequence[float | None], **others: Any) -> list[Run]:

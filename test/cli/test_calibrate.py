@@ -19,7 +19,7 @@ from robot_formation.calibration.motor_report import encoders_text, motors_text
 from robot_formation.cli.main import main
 from robot_formation.drive.curves import load_calibration
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("calibrate")]
 
 QUICK = ("--repeats", "1")
 Measured = tuple[Path, subprocess.CompletedProcess[str]]

@@ -32,7 +32,7 @@ from robot_formation.follower.camera_calibration_file import load_vision
 from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("calibrate_vision")]
 
 QUICK = ("--step", "0.45", "--jobs", "1")
 FILES = {"vision.csv", "vision.json", "vision.yaml", "vision_bag"} | {

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 PROCESS = [sys.executable, "-m", "robot_formation.cli"]
 QUICK_RUN = ["run", "--track", "one", "--in-process", "--camera", "on_demand", "--set", "leader.timesteps=1", "--json"]
-LONG_RUN = [*QUICK_RUN[:-2], "leader.timesteps=500"]
+LONG_RUN = [*QUICK_RUN[:-2], "leader.timesteps=500", "--set", "leader.step_m=0.001"]
 # Sends its own process a signal at a certain point: nothing has to be timed.
 HOOK = """
 import os, signal, sys

@@ -21,6 +21,7 @@ from robot_formation.koopman.predictors import NAMES, Predictor, PredictorParame
 from synthetic_bag import POSE_COVARIANCE, Step, SyntheticRun, pose_with_covariance
 
 ERRORS = ["n", "rmse_u", "rmse_v", "rmse", "median", "worst", "coverage_90"]
+OF_MODEL = {"k", "condition_number", "eigenvalues", "consistency_index", "weights"}
 STEPS = [
     Step(moved=(0.010, 0.050), residual=(0.001, 0.002)),
     Step(moved=(0.012, 0.051), residual=(-0.001, 0.0)),
@@ -75,10 +76,13 @@ def test_json_holds_forecast_covariance_and_errors_of_each_predictor_and_nothing
     said = predict(capsys, log, "--json")
     assert said.err == ""
     found = json.loads(said.out)
-    assert list(found) == ["predictors"]
+    assert list(found) == ["predictors", "best"]
+    rmse = {name: values["error_m"]["rmse"] for name, values in found["predictors"].items()}
+    assert found["best"] == min(rmse, key=lambda name: rmse[name])
     assert list(found["predictors"]) == list(NAMES)
     for values in found["predictors"].values():
-        assert list(values) == ["forecast", "covariance", "error_m"]
+        assert list(values)[:3] == ["forecast", "covariance", "error_m"]
+        assert set(values) - {"forecast", "covariance", "error_m"} == OF_MODEL
         assert values["forecast"][0] is None
         assert values["covariance"][0] is None
         assert np.array(values["forecast"][1:]).shape == (11, 2)
@@ -100,9 +104,9 @@ def test_a_forecast_is_that_of_a_predictor_that_saw_the_rows_before(
     for t in range(12):
         if t:
             expected = predictor.predict()
-            assert found["forecast"][t] == expected.mean.tolist()
-            assert found["covariance"][t] == expected.covariance.tolist()
-        predictor.observe(rows.displacements_m[t], rows.residuals_m[t])
+            assert found["forecast"][t] == expected.mean[:2].tolist()
+            assert found["covariance"][t] == expected.covariance[:2, :2].tolist()
+        predictor.observe(np.append(rows.displacements_m[t], 0.0), np.append(rows.residuals_m[t], 0.0))
     errors = rows.targets_m[1:] - np.array(found["forecast"][1:])
     assert found["error_m"]["rmse"] == pytest.approx(np.sqrt(np.mean(np.sum(errors**2, axis=1))))
 
@@ -140,7 +144,8 @@ def test_a_single_row_has_no_forecast_and_no_errors(capsys: pytest.CaptureFixtur
     path = tmp_path / "log.csv"
     path.write_text("u_m,v_m\n0.01,0.05\n")
     found = forecasts(capsys, path, "--predictor", "measured")["measured"]
-    assert found == {"forecast": [None], "covariance": [None], "error_m": {**dict.fromkeys(ERRORS), "n": 0}}
+    nothing = {"forecast": [None], "covariance": [None], "error_m": {**dict.fromkeys(ERRORS), "n": 0}}
+    assert found == {**nothing, **dict.fromkeys(OF_MODEL)}
     said = predict(capsys, path)
     assert next(line for line in said.out.splitlines() if line.startswith("measured")).split()[1:] == ["0", *["-"] * 6]
     assert (tmp_path / "log_forecasts.png").stat().st_size > 5000
@@ -292,3 +297,73 @@ def test_forecasts_of_a_runs_bag_are_what_its_predictor_said(
     said = [(entry.motion.u_m, entry.motion.v_m) for entry in load_run(bag).followers[0].predictions]
     found = forecasts(capsys, "--bag", bag, "--predictor", "measured")["measured"]["forecast"]
     np.testing.assert_allclose(found[1:], said[:4], rtol=0, atol=1e-12)
+
+
+# --- logs of one's own ----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def foreign(tmp_path: Path) -> Path:
+    """A log in millimetres with names of its own: a sine sideways, a turn, and two bad rows."""
+    rows = [f"{20.0 * np.cos(0.45 * t):.3f},30.0,{0.01:.2f}" for t in range(40)]
+    rows[20], rows[30] = "x,30.0,0.0", "90000.0,30.0,0.0"
+    path = tmp_path / "own.csv"
+    path.write_text("\n".join(["dx,dy,yaw", *rows, ""]))
+    return path
+
+
+OWN = ("--columns", "u_m=dx,v_m=dy,turn_rad=yaw", "--unit", "mm")
+
+
+def test_a_log_with_other_names_and_units_is_read_and_bad_rows_are_left_out_and_counted(
+    capsys: pytest.CaptureFixture[str], foreign: Path
+) -> None:
+    said = predict(capsys, foreign, *OWN, "--skip-bad", "--json", "--predictors", "previous,formation")
+    found = json.loads(said.out)
+    assert len(found["predictors"]["previous"]["forecast"]) == 38
+    assert found["predictors"]["previous"]["forecast"][1] == pytest.approx([0.020, 0.030])
+    assert found["best"] == "formation"
+    assert "2 bad row(s) left out; the first" in said.err
+    assert "line 22: u_m is 'x'" in said.err
+    assert "line 22: u_m is 'x', which is no number" in complaint(capsys, foreign, *OWN)
+
+
+def test_the_horizon_judges_the_ways_of_several_timesteps(capsys: pytest.CaptureFixture[str], foreign: Path) -> None:
+    options = (*OWN, "--skip-bad", "--horizon", "3", "--predictors", "previous,formation")
+    found = forecasts(capsys, foreign, *options)
+    for values in found.values():
+        assert [row["h"] for row in values["horizon"]] == [1, 2, 3]
+        assert [row["n"] for row in values["horizon"]] == [37, 36, 35]
+        assert values["horizon"][0]["rmse"] == pytest.approx(values["error_m"]["rmse"])
+    assert found["formation"]["horizon"][2]["rmse"] < 0.6 * found["previous"]["horizon"][2]["rmse"]
+    table = predict(capsys, foreign, *options, "--no-figure").out
+    assert "formation" in next(line for line in table.splitlines() if line.endswith("<- least RMSE"))
+    assert "h = 3" in table
+
+
+def test_k_with_eigenvalues_and_their_periods_is_told_where_there_is_one(
+    capsys: pytest.CaptureFixture[str], foreign: Path
+) -> None:
+    found = forecasts(capsys, foreign, *OWN, "--skip-bad", "--predictors", "previous,formation,measured")
+    assert {found["previous"][key] for key in OF_MODEL} == {None}
+    assert np.array(found["measured"]["k"]).shape == (2, 2)
+    eigenvalues = found["formation"]["eigenvalues"]
+    assert any(row["period"] == pytest.approx(2.0 * np.pi / 0.45, rel=0.1) for row in eigenvalues if row["period"])
+    assert sum(found["formation"]["weights"]["v"].values()) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--columns", "u_m"), "is no NAME=COLUMN"),
+        (("--columns", "w_m=dx"), "no 'w_m' in a log"),
+        (("--columns", "u_m=dx,v_m=dx"), "names what is named already"),
+        (("--columns", "u_m=dz"), "no column 'dz' in the header"),
+        (("--horizon", "0"), "no number of timesteps from 1 to 50"),
+        (("--unit", "km"), "can't be 'km'"),
+    ],
+)
+def test_wrong_options_for_logs_of_ones_own_are_refused_in_a_line(
+    capsys: pytest.CaptureFixture[str], foreign: Path, options: tuple[str, ...], said: str
+) -> None:
+    assert said in complaint(capsys, foreign, *options)

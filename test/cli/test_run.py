@@ -88,19 +88,22 @@ def test_a_bag_that_cannot_be_written_is_said(capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize("track", ["one", "two"])
 @pytest.mark.parametrize("predictor", ["previous", "literal", "measured"])
 def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(
-    tmp_path: Path, track: str, predictor: str
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, track: str, predictor: str
 ) -> None:
     bag = tmp_path / "bag"
-    completed = formation("run", "--track", track, "--predictor", predictor, "--seed", 3, "--bag", bag, "--json", *FAST)
-    assert completed.returncode in (0, 3), completed.stderr
-    run = json_of(completed)
-    assert run["outcome"] == ("done" if completed.returncode == 0 else "lost")
-    if completed.returncode == 0:
+    words = ["run", "--track", track, "--predictor", predictor, "--seed", "3", "--bag", str(bag), "--json", *FAST]
+    code = main(words)
+    said = capsys.readouterr()
+    assert code in (0, 3), said.err
+    run = json.loads(said.out)
+    assert run["outcome"] == ("done" if code == 0 else "lost")
+    if code == 0:
         assert [row["t"] for row in run["timesteps"]] == list(range(1, (15 if track == "one" else 20) + 1))
     assert (bag / "metadata.yaml").is_file()
-    found = json_of(formation("analyze", bag, "--json"))
+    assert main(["analyze", str(bag), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
     assert (run["conditions"].pop("in_process"), found["conditions"].pop("in_process")) == (True, None)
-    assert (run.pop("reason") is None) == (completed.returncode == 0)
+    assert (run.pop("reason") is None) == (code == 0)
     assert found.pop("reason") is None
     assert found == run
     assert (run["bag"], run["pictures"], run["seed"]) == (str(bag), [], 3)
@@ -204,6 +207,7 @@ def test_json_of_a_run_that_left_nothing_to_analyse_says_what_it_was_to_be_and_w
         "totals": None,
         "seed": 5,
         "predictor": "formation",
+        "path": "straight",
         "surface": "plane",
         "conditions": {
             "mode": "precise",

@@ -33,8 +33,8 @@ def test_it_answers_when_both_halves_are_there_whichever_comes_first(wire: Wire,
     halves = [("displacement", "residual")[i] for i in order]
     messages = [report(Motion.from_uv(0.012, 0.05), 100)[i] for i in order]
     assert wire.give(halves[0], messages[0]) == []
-    ((topic, message),) = wire.give(halves[1], messages[1])
-    assert topic == "prediction"
+    (forecast, _), (topic, message) = wire.give(halves[1], messages[1])
+    assert (forecast, topic) == ("forecast", "prediction")
     assert conversions.stamp_of(message) == 100
     assert message.header.frame_id == "follower_1/base_link"
     found = conversions.read_displacement(message)
@@ -45,15 +45,15 @@ def test_halves_of_different_timesteps_are_no_pair(wire: Wire) -> None:
     assert wire.give("displacement", report(Motion(0.05), 100)[0]) == []
     assert wire.give("residual", report(Motion(0.05), 200)[1]) == []
     assert wire.component.details()["timesteps"] == "0"
-    assert len(wire.give("residual", report(Motion(0.05), 100)[1])) == 1
-    assert len(wire.give("displacement", report(Motion(0.06), 200)[0])) == 1
+    assert len(wire.give("residual", report(Motion(0.05), 100)[1])) == 2
+    assert len(wire.give("displacement", report(Motion(0.06), 200)[0])) == 2
 
 
 def test_a_residual_that_was_not_seen_is_half_of_a_pair_too(wire: Wire) -> None:
     displacement, _ = report(Motion(0.05), 7)
     unseen = conversions.displacement(Motion(), "follower_1/base_link", 7, conversions.NO_ESTIMATE)
     wire.give("displacement", displacement)
-    assert len(wire.give("residual", unseen)) == 1
+    assert len(wire.give("residual", unseen)) == 2
 
 
 def test_predictions_and_covariances_are_the_models_own_with_u_and_v_turned_into_x_and_y() -> None:
@@ -63,11 +63,11 @@ def test_predictions_and_covariances_are_the_models_own_with_u_and_v_turned_into
     for stamp_ns, (u, v) in enumerate(history):
         displacement, residual = report(Motion.from_uv(u, v), stamp_ns)
         wire.give("displacement", displacement)
-        ((_, message),) = wire.give("residual", residual)
-        model.observe(np.array([u, v]), np.zeros(2))
+        *_, (_, message) = wire.give("residual", residual)
+        model.observe(np.array([u, v, 0.0]), np.zeros(3))
         forecast = model.predict()
         found = conversions.read_displacement(message)
-        assert (found.u_m, found.v_m) == tuple(forecast.mean)
+        assert (found.u_m, found.v_m) == tuple(forecast.mean[:2])
         xy = np.reshape(message.pose.covariance, (6, 6))[:2, :2]
         uu, uv, vv = forecast.covariance[0, 0], forecast.covariance[0, 1], forecast.covariance[1, 1]
         assert xy == pytest.approx(np.array([[vv, -uv], [-uv, uu]]), abs=1e-20)
@@ -82,7 +82,7 @@ def test_a_displacement_that_is_refused_is_warned_of_and_still_answered_from_wha
         wire.give(topic, message)
     displacement, residual = report(Motion(math.nan, 0.0), 2)
     wire.give("displacement", displacement)
-    ((_, message),) = wire.give("residual", residual)
+    *_, (_, message) = wire.give("residual", residual)
     assert conversions.read_displacement(message) == Motion(0.05, 0.01)
     assert conversions.stamp_of(message) == 2
     assert "not finite" in wire.warnings[0]
@@ -92,7 +92,7 @@ def test_a_displacement_that_is_refused_is_warned_of_and_still_answered_from_wha
 def test_with_nothing_known_at_all_the_answer_says_that_it_is_no_estimate(wire: Wire) -> None:
     displacement, residual = report(Motion(math.nan, 0.0), 2)
     wire.give("displacement", displacement)
-    ((_, message),) = wire.give("residual", residual)
+    *_, (_, message) = wire.give("residual", residual)
     assert not conversions.has_estimate(message)
     assert len(wire.warnings) == 2
 
@@ -101,7 +101,7 @@ def test_a_displacement_without_an_estimate_is_left_out_and_answered_from_what_i
     give(wire, 1, Motion(0.05, 0.01), order=("displacement", "residual"))
     none = conversions.displacement(Motion(), BASE, 2, conversions.NO_ESTIMATE)
     wire.give("displacement", none)
-    ((_, message),) = wire.give("residual", report(Motion(), 2)[1])
+    *_, (_, message) = wire.give("residual", report(Motion(), 2)[1])
     assert conversions.read_displacement(message) == Motion(0.05, 0.01)
     assert "without an estimate" in wire.warnings[0]
     assert wire.component.details()["timesteps"] == "1"
@@ -109,7 +109,7 @@ def test_a_displacement_without_an_estimate_is_left_out_and_answered_from_what_i
 
 def test_a_displacement_that_is_not_finite_is_warned_of_at_once(wire: Wire) -> None:
     wire.give("displacement", report(Motion(math.inf, 0.0), 2)[0])
-    assert "displacement: (-0.0, inf) m is not finite" in wire.warnings[0]
+    assert "displacement: (-0.0, inf) m, 0.0 rad is not finite" in wire.warnings[0]
 
 
 @pytest.mark.parametrize("topic", [0, 1])
@@ -123,7 +123,7 @@ def test_halves_that_never_become_pairs_are_forgotten_with_a_warning(wire: Wire,
     assert wire.warnings[0] == f"{name} of 0 ns came without the rest of the timestep and is forgotten"
     other = ("residual", "displacement")[topic]
     assert wire.give(other, report(Motion(0.05), 0)[1 - topic]) == []
-    assert len(wire.give(other, report(Motion(0.05), 99)[1 - topic])) == 1
+    assert len(wire.give(other, report(Motion(0.05), 99)[1 - topic])) == 2
 
 
 # --- commanded ------------------------------------------------------------------------------------------------------
@@ -158,15 +158,15 @@ def give(
 
 def test_commanded_is_waited_for_once_it_has_been_heard_of_in_an_earlier_timestep(wire: Wire) -> None:
     answers = give(wire, 1, Motion(0.05), commanded=Motion(0.05), order=("displacement", "residual", "commanded"))
-    assert [len(answers[name]) for name in ("displacement", "residual", "commanded")] == [0, 1, 0]
+    assert [len(answers[name]) for name in ("displacement", "residual", "commanded")] == [0, 2, 0]
     answers = give(wire, 2, Motion(0.05), commanded=Motion(0.05), order=("displacement", "residual", "commanded"))
-    assert [len(answers[name]) for name in ("displacement", "residual", "commanded")] == [0, 0, 1]
+    assert [len(answers[name]) for name in ("displacement", "residual", "commanded")] == [0, 0, 2]
 
 
 def test_who_sends_no_commanded_gets_answers_too(wire: Wire) -> None:
     for stamp_ns in range(1, 5):
         answers = give(wire, stamp_ns, Motion(0.05), order=("displacement", "residual"))
-        assert len(answers["residual"]) == 1
+        assert len(answers["residual"]) == 2
 
 
 @pytest.mark.parametrize("name", ["formation", "previous", "measured+close"])
@@ -183,7 +183,7 @@ def test_what_is_learned_does_not_depend_on_the_order_in_which_the_parts_arrive(
             for part in order:
                 wire.give(part, messages[part])
     assert [str(message) for _, message in steady.sent] == [str(message) for _, message in shuffled.sent]
-    assert len(steady.sent) == 19
+    assert len(steady.sent) == 2 * 19
     assert steady.warnings == []
 
 
@@ -197,17 +197,18 @@ def test_the_predictor_gets_residual_and_command_and_publishes_the_command() -> 
         motions = [Motion.from_uv(*value) for value in (x, r, c)]
         answers = give(wire, stamp_ns, motions[0], motions[1], None if none else motions[2])
         # The first timestep's command is not used, in whatever order it comes.
+        x, r, c = (np.append(value, 0.0) for value in (x, r, c))
         model.observe(x, r, None if none or stamp_ns == 1 else c)
-        ((_, message),) = [answer for found in answers.values() for answer in found]
+        *_, (_, message) = [answer for found in answers.values() for answer in found]
         forecast, found = model.predict(), conversions.read_displacement(message)
-        assert (found.u_m, found.v_m) == tuple(forecast.command)
+        assert (found.u_m, found.v_m) == tuple(forecast.command[:2])
         about = forecast.about_command
         xy = np.reshape(message.pose.covariance, (6, 6))[:2, :2]
         assert xy == pytest.approx(np.array([[about[1, 1], -about[0, 1]], [-about[0, 1], about[0, 0]]]), abs=1e-20)
     assert isinstance(wire.component, PredictorComponent)
-    assert wire.component.actuation_bias() == tuple(forecast.mean - forecast.command)
+    assert wire.component.actuation_bias() == tuple((forecast.mean - forecast.command)[:2])
     assert max(map(abs, wire.component.actuation_bias())) > 0.001
-    assert {"residual [m]", "actuation bias [m]", "weight of koopman"} <= set(wire.component.details())
+    assert {"residual [m]", "actuation bias [m]", "weights along u"} <= set(wire.component.details())
 
 
 # --- state file -----------------------------------------------------------------------------------------------------

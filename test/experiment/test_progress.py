@@ -18,7 +18,7 @@ from robot_formation.bag.reader import read_bag
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.progress import Progress
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("progress")]
 
 LINE = re.compile(
     r"(?:(?P<robot>follower_\d)  )?timestep +(?P<t>\d+)/(?P<n>\d+)  correction +(?P<correction>[\d.]+) cm  "

@@ -18,7 +18,7 @@ from robot_formation.koopman.predictors import NAMES
 
 SHORT = ("leader.timesteps=4",)
 PLAN = Plan(("two",), ("plane",), ("previous", "ideal+close"), (1000, 1001), SHORT)
-NUMBERS = [field.name for field in fields(Row)][6:]
+NUMBERS = [field.name for field in fields(Row)][7:]
 
 
 def row_of(task: Task, correction_m: float = 0.1) -> Row:
@@ -127,6 +127,7 @@ number = st.one_of(st.none(), st.floats(allow_nan=False, allow_infinity=False))
         surface=st.just("bowl"),
         predictor=st.sampled_from(["previous", "ideal+close"]),
         seed=st.integers(0, 2**60),
+        path=st.sampled_from(["straight", "circle"]),
         outcome=st.sampled_from(["done", "lost", "left_plate", "incomplete"]),
         timesteps=st.integers(0, 1000),
         **dict.fromkeys(NUMBERS, number),
@@ -137,6 +138,24 @@ def test_a_row_survives_the_table_to_the_last_bit(tmp_path_factory: pytest.TempP
     Table(folder, PLAN).add(row)
     (found,) = Table(folder, PLAN).rows.values()
     assert repr(found) == repr(row)
+
+
+def test_a_table_of_before_there_were_paths_is_of_straight_ones(tmp_path: Path) -> None:
+    rows = filled(tmp_path, count=2).rows
+    names, *lines = (line.split(",") for line in (tmp_path / "runs.csv").read_text().splitlines())
+    column = names.index("path")
+    former = [cells[:column] + cells[column + 1 :] for cells in (names, *lines)]
+    (tmp_path / "runs.csv").write_text("".join(",".join(cells) + "\n" for cells in former))
+    assert Table(tmp_path, PLAN).rows == rows
+
+
+def test_a_sweep_over_paths_has_every_path_with_every_seed() -> None:
+    plan = Plan(("two",), ("plane",), ("previous",), (1, 2), SHORT, ("straight", "circle"))
+    plan.check()
+    assert [(task.seed, task.path) for task in plan.tasks()] == [
+        (1, "straight"), (1, "circle"), (2, "straight"), (2, "circle"),
+    ]  # fmt: skip
+    assert sweep.build(Task("two", "plane", "previous", 1, "circle"), SHORT).leader.path == "circle"
 
 
 def test_the_table_is_a_csv_file_with_the_names_of_the_quantities(tmp_path: Path) -> None:

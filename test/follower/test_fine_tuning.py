@@ -122,7 +122,9 @@ def test_the_whole_cycle_from_collection_to_prediction() -> None:
     assert state == State(AlignmentState.ALIGNED)
     assert isinstance(report, Report)
     assert (report.displacement.x_m, report.displacement.y_m) == pytest.approx((0.052, -0.001))
-    assert report.residual == residual_of(IN_PLACE, script)
+    assert report.residual is not None
+    assert report.residual.mean == residual_of(IN_PLACE, script)
+    assert not report.residual.turn_known
     assert script.tuner.phase is Phase.PREDICTION
     assert script.prediction(Motion(0.2, 0.1)) == [Done(1)]
 
@@ -195,7 +197,8 @@ def test_unaligned_after_too_many_corrections_is_warned_reported_and_goes_on() -
     state, warning, report = script.look(TOO_FAR_BACK)
     assert state == State(AlignmentState.UNALIGNED)
     assert "not aligned after 1 moves" in warning.text
-    assert report.residual == residual_of(TOO_FAR_BACK, script)
+    assert report.residual is not None
+    assert report.residual.mean == residual_of(TOO_FAR_BACK, script)
     assert script.prediction(Motion(0.05)) == [Done(1)]
 
 

@@ -9,7 +9,7 @@ from graph_tools import BusyCores, displacements, launch, short_scenario
 from repository import HELPERS
 from robot_formation.experiment.in_process import run_in_process
 
-pytestmark = pytest.mark.graph
+pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("determinism")]
 
 Displacements = list[tuple[int, float, float, float]]  # stamp, x, y and yaw of each
 

@@ -114,7 +114,7 @@ def test_a_lost_leader_ends_the_run_in_good_order(tmp_path: Path) -> None:
 def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path: Path, number: signal.Signals) -> None:
     bag = tmp_path / "bag"
     command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand", "--json"]
-    command += ["--set", "leader.timesteps=500", "--bag", str(bag)]
+    command += ["--set", "leader.timesteps=500", "--set", "leader.step_m=0.001", "--bag", str(bag)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         for line in process.stderr:
@@ -137,7 +137,7 @@ def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path: Path,
 def test_nodes_end_when_their_launcher_is_killed(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand"]
-    command += ["--set", "leader.timesteps=500", "--bag", str(bag)]
+    command += ["--set", "leader.timesteps=500", "--set", "leader.step_m=0.001", "--bag", str(bag)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         for line in process.stderr:

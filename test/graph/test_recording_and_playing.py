@@ -17,7 +17,10 @@ from std_msgs.msg import String, UInt32
 from std_srvs.srv import SetBool, Trigger
 
 from dying_recorder import limit_file_size, ticks_in_finished_chunks, ticks_of
+from forked_nodes import ForkedNode
 from graph_lab import DEADLINE_S, Lab, open_lab, values_of
+from graph_tools import STRICT
+from node_server import COMMAND_LINE
 from robot_formation import conversions, names
 from robot_formation.bag.info import bag_info
 from robot_formation.bag.qos import TopicQos
@@ -43,11 +46,15 @@ class BagLab(Lab):
     """A lab that also calls the command line in its domain."""
 
     def formation(self, *arguments: object, **options: Any) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "robot_formation.cli", *map(str, arguments)]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
-        process = subprocess.Popen(command, env=self.environment, text=True, **pipes)
-        self.processes.append(process)
-        return process
+        environment = {**self.environment, **STRICT}
+        words = list(map(str, arguments))
+        if not options:
+            self.processes.append(ForkedNode(COMMAND_LINE, words, environment))
+        else:
+            command = [sys.executable, "-m", "robot_formation.cli", *words]
+            pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+            self.processes.append(subprocess.Popen(command, env=environment, text=True, **pipes))
+        return self.processes[-1]
 
     def record(self, *arguments: object, **options: Any) -> subprocess.Popen[str]:
         """Start recording; returns when the recorder runs."""

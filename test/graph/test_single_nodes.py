@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from forked_nodes import ForkedNode
 from graph_lab import DEADLINE_S, Lab, values_of
+from graph_tools import STRICT
 from robot_formation import conversions, names
 from robot_formation.bag.reader import read_bag
 from robot_formation.components.catalogue import KINDS
@@ -23,18 +25,14 @@ pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("nodes")]
 
 def alone(name: str, namespace: str, *arguments: str, tmp_path: Path) -> tuple[int, str]:
     """Run a node that must end by itself; returns exit code and its last line."""
-    command = [sys.executable, "-m", "robot_formation.nodes", name, "--ros-args", "-r", f"__ns:={namespace}"]
-    with DomainReservation() as domain:
-        completed = subprocess.run(
-            [*command, *arguments],
-            env=node_environment(domain, tmp_path),
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
-    assert "Traceback" not in completed.stderr
-    return completed.returncode, completed.stderr.strip().splitlines()[-1]
+    words = ["--ros-args", "-r", f"__ns:={namespace}", *arguments]
+    with (
+        DomainReservation() as domain,
+        ForkedNode(name, words, {**node_environment(domain, tmp_path), **STRICT}) as node,
+    ):
+        _, errors = node.communicate(timeout=60)
+    assert "Traceback" not in errors
+    return node.returncode, errors.strip().splitlines()[-1]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import contextlib
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,6 +16,7 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
+from forked_nodes import ForkedNode
 from graph_tools import STRICT
 from robot_formation import conversions
 from robot_formation.launching.environment import node_environment
@@ -54,8 +54,10 @@ class Lab:
         self.join()
 
     def start(self, name: str, *arguments: str, namespace: str = "/") -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "robot_formation.nodes", name, "--ros-args", "-r", f"__ns:={namespace}"]
-        return self.open([*command, *arguments], {**self.environment, **STRICT})
+        """Start a node with Python's warnings as errors, in a session of its own, as a terminal would."""
+        words = ["--ros-args", "-r", f"__ns:={namespace}", *arguments]
+        self.processes.append(ForkedNode(name, words, {**self.environment, **STRICT}))
+        return self.processes[-1]
 
     def open(
         self, command: Sequence[str], environment: Mapping[str, str], cwd: Path | None = None

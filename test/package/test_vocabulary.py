@@ -26,6 +26,7 @@ REPLACED = {
 }
 ENDINGS = r"(?:e?s|d|ed|ing)?"
 WORD = re.compile(rf"\b(?:{'|'.join(REPLACED)}){ENDINGS}\b")
+ESCAPE = re.compile(r"\\.")
 CODE = sorted(
     file for folder in ("robot_formation", "test", "bench", "launch", "docs") for file in (ROOT / folder).rglob("*.py")
 )
@@ -53,6 +54,8 @@ def texts(source: str) -> Iterator[str]:
 def replaced_in(file: Path) -> set[str]:
     """Find the replaced words of a page or of a Python file."""
     source = file.read_text(encoding="utf-8")
+    if not WORD.search(words(ESCAPE.sub(" ", source))):  # most files: to take one apart costs a hundred times as much
+        return set()
     found = texts(source) if file.suffix == ".py" else [source]
     return {word for text in found for word in WORD.findall(words(text))}
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robot_formation.alignment.precise.pose_filter import FilterParameters
+from robot_formation.alignment.precise.step_models import Drives
 from robot_formation.geometry.se2 import Motion, into_frame
 from robot_formation.parameters import parameter
 
@@ -48,6 +49,9 @@ class ActuationParameters:
         low=0.0,
         high=0.1,
     )
+    wheel_lever_m: float = parameter(
+        0.205, "Way of the wheels per radian of a turn: drive.wheel_lever_m", unit="m", low=0.0, high=10.0
+    )
 
 
 class ActuationModel:
@@ -75,8 +79,13 @@ class ActuationModel:
         self._short: dict[tuple[str, bool], float] = {}
 
     @property
+    def drives_so_far(self) -> Drives:
+        """What is known of own drives."""
+        return Drives(self.slip, self.overshoot, self.drives)
+
+    @property
     def slip(self) -> float:
-        """Way aside (to the left) per way ahead, where none was asked for."""
+        """Way aside (to the left) per way of the wheels ahead and in turns, where none was asked for."""
         return float(self._aside[0])
 
     def compensated(self, motion: Motion) -> Motion:
@@ -95,16 +104,16 @@ class ActuationModel:
                 self._learn(axis, want, (a - b) * math.copysign(1.0, want))
             self._wanted = None
         if sent[0] > _LEAST_DRIVE_M and got[0] > _LEAST_DRIVE_M and abs(sent[1]) < _LONGEST_BESIDE_M:
-            self._learn_drive(sent, got)
+            self._learn_drive(sent, got, self._p.wheel_lever_m * abs(turn))
 
-    def _learn_drive(self, sent: tuple[float, float], got: tuple[float, float]) -> None:
+    def _learn_drive(self, sent: tuple[float, float], got: tuple[float, float], turning_m: float) -> None:
         """Learn from a drive ahead: recursive least squares with forgetting for what it leads aside."""
         overshoot = max(-_MOST_OVERSHOOT, min(_MOST_OVERSHOOT, got[0] / sent[0] - 1.0))
         self.overshoot += (_OVERSHOOT_GAIN if self.drives else 1.0) * (overshoot - self.overshoot)
         self.drives += 1
         # A leg shorter than the robot's coasting is not driven at all.
         driven = abs(sent[1]) > self._p.least_leg_m
-        regressor = np.array([got[0], 1.0 if driven else 0.0])
+        regressor = np.array([got[0] + turning_m, 1.0 if driven else 0.0])
         beside = got[1] - (sent[1] if driven else 0.0)
         spread = self._covariance @ regressor
         gain = spread / (self._noise_m**2 + regressor @ spread)

@@ -31,7 +31,9 @@ from robot_formation.alignment.precise.marker_projection import (
     relative_tilt,
 )
 from robot_formation.alignment.precise.pose_hypothesis import Hypothesis, LookUpdate
+from robot_formation.alignment.precise.step_models import Drives, StepModel, StepModels, StepParameters
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.uncertain_motion import UncertainMotion
 from robot_formation.parameters import parameter
 from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
@@ -91,21 +93,11 @@ class FilterParameters:
     skew_sigma_per_m: float = parameter(0.02, "Mixed part of the ground's curvature", unit="1/m", low=1e-4, high=10.0)
     move_sigma: float = parameter(0.02, "Error of a measured move, share of its length", low=0.0, high=1.0)
     move_floor_m: float = parameter(0.0007, "Error of a measured move, least", unit="m", low=0.0, high=0.1)
-    turn_sigma: float = parameter(0.06, "Error of a measured turn, share of it", low=0.0, high=1.0)
+    turn_sigma: float = parameter(0.02, "Error of a measured turn, share of it", low=0.0, high=1.0)
     yaw_drift_rad: float = parameter(
         0.0022,
         "Turn by slip on a move of 10 cm, which the wheels don't measure; grows with the root of the way",
         unit="rad",
-        low=0.0,
-        high=1.0,
-    )
-    neighbour_step_sigma_m: float = parameter(
-        0.02, "How far the neighbour's step may differ from the last one", unit="m", low=0.0, high=1.0
-    )
-    neighbour_sidestep_sigma_m: float = parameter(
-        0.0005,
-        "How far the neighbour's step leads aside from its heading, least; more where the NIS after steps is high",
-        unit="m",
         low=0.0,
         high=1.0,
     )
@@ -136,20 +128,26 @@ class FilterParameters:
         low=0.0,
         high=1000.0,
     )
-    neighbour_turn_sigma_rad: float = parameter(
-        0.003, "How far the neighbour turns by slip in its step", unit="rad", low=0.0, high=1.0
-    )
+    step: StepParameters = StepParameters()
 
 
 class PoseFilter:
     """Where the neighbour stands, as far as looks and moves tell."""
 
-    def __init__(self, model: MarkerModel, edges: EdgeParameters, parameters: FilterParameters) -> None:
+    def __init__(
+        self,
+        model: MarkerModel,
+        edges: EdgeParameters,
+        parameters: FilterParameters,
+        least_leg_m: float = 0.0,
+        wheel_lever_m: float = 0.0,
+    ) -> None:
         self._model = model
         self._edges = edges
         self._looks = LookUpdate(model, edges)
         self._p = parameters
         self.hypotheses: list[Hypothesis] = []
+        self._models = StepModels(parameters.step, least_leg_m, wheel_lever_m)
         self._nis = 0.0
         self._stepped = False
 
@@ -218,39 +216,56 @@ class PoseFilter:
         hypothesis.state = moved
         hypothesis.covariance = jacobian @ hypothesis.covariance @ jacobian.T + swing @ noise @ swing.T
 
-    def neighbour_stepped(self, step: Motion, overshoot: float = 0.0, sidestep_sigma_m: float | None = None) -> None:
-        """Predict (EKF time update) that the neighbour has made a step of about this size in its own frame.
+    def neighbour_stepped(self, step: UncertainMotion, own: Drives, first: bool = False) -> None:
+        """Predict (EKF time update) that the neighbour has made a step, by each of the step models.
 
         Args:
-            step: its way ahead, and aside if it slips as the follower does.
-            overshoot: how much farther than asked for the robots drive here, share of the way.
-            sidestep_sigma_m: how certain the way aside is; by default as in the parameters.
+            step: the step as forecast, in the neighbour's frame at its start, with covariance.
+            own: what the follower knows of its own drives.
+            first: whether it is the first step, which is known beforehand.
         """
-        p = self._p
-        overshoot = max(0.0, overshoot)
-        slip = p.slip_per_tilt + p.slip_growth * overshoot**2
-        # What the ground does to a step is a model of the default world; where it fails, it counts for less.
-        inflation = min(_MOST_INFLATION, max(1.0, self._nis / p.calm_nis))
-        sidestep = p.neighbour_sidestep_sigma_m * inflation if sidestep_sigma_m is None else sidestep_sigma_m
+        models = self._models.models(step, own, self._inflation, first)
+        tilt_rad = float(relative_tilt(self.best.state[None])[0][0]) if self.hypotheses else 0.0
+        branch = not self._stepped  # without a look since the last step, nothing tells the models apart
         self._stepped = True
+        found = []
         for hypothesis in self.hypotheses:
-            state, covariance = hypothesis.state, hypothesis.covariance
-            c, s = math.cos(state[YAW]), math.sin(state[YAW])
-            along = np.array([[c, -s], [s, c]])
-            # The neighbour slips as the follower does, and by as much more as it is tilted more.
-            tilt_rad = float(relative_tilt(state[None])[0][0])
-            aside = step.y_m - slip * tilt_rad * abs(step.x_m)
-            jacobian = np.eye(SIZE)
-            jacobian[:2, YAW] = along @ (-aside, step.x_m)
-            hypothesis.state = state.copy()
-            hypothesis.state[:2] += along @ (step.x_m, aside)
-            hypothesis.state[YAW] += p.turn_growth * overshoot**2 * tilt_rad * abs(step.x_m)
-            noise = np.zeros((SIZE, SIZE))
-            noise[:2, :2] = along @ np.diag([p.neighbour_step_sigma_m**2, sidestep**2]) @ along.T
-            noise[YAW, YAW] = p.neighbour_turn_sigma_rad**2
-            for part in (CURVATURE, SADDLE, SKEW):
-                noise[part, part] = (p.curvature_drift_per_m * inflation) ** 2
-            hypothesis.covariance = jacobian @ covariance @ jacobian.T + noise
+            for number, model in enumerate(models):
+                if not branch and number != hypothesis.model:
+                    continue
+                cost = hypothesis.cost + (self._models.costs[number] if branch else 0.0)
+                stepped = Hypothesis(hypothesis.state.copy(), hypothesis.covariance, cost, number)
+                self._step(stepped, model, own, tilt_rad)
+                found.append(stepped)
+        self.hypotheses = sorted(found, key=lambda h: h.cost)
+
+    @property
+    def _inflation(self) -> float:
+        """How much larger the step models' noise is than where they hold."""
+        return min(_MOST_INFLATION, max(1.0, self._nis / self._p.calm_nis))
+
+    def _step(self, hypothesis: Hypothesis, model: StepModel, own: Drives, tilt_rad: float) -> None:
+        """Predict one hypothesis; `tilt_rad` is the relative tilt of the likeliest."""
+        p, step = self._p, model.step
+        overshoot = max(0.0, own.overshoot)
+        slip = p.slip_per_tilt + p.slip_growth * overshoot**2
+        state, covariance = hypothesis.state, hypothesis.covariance
+        c, s = math.cos(state[YAW]), math.sin(state[YAW])
+        along = np.array([[c, -s], [s, c]])
+        # The neighbour slips as the follower does, and by as much more as it is tilted more.
+        tilt = float(relative_tilt(state[None])[0][0]) - (tilt_rad if model.slip_included else 0.0)
+        aside = step.y_m - slip * tilt * (abs(step.x_m) + self._models.turning_way_m(step))
+        jacobian = np.eye(SIZE)
+        jacobian[:2, YAW] = along @ (-aside, step.x_m)
+        state[:2] += along @ (step.x_m, aside)
+        state[YAW] += step.yaw_rad + p.turn_growth * overshoot**2 * tilt * abs(step.x_m)
+        noise = np.zeros((SIZE, SIZE))
+        turned = np.eye(3)
+        turned[:2, :2] = along
+        noise[:3, :3] = turned @ model.covariance @ turned.T
+        for part in (CURVATURE, SADDLE, SKEW):
+            noise[part, part] = (p.curvature_drift_per_m * self._inflation) ** 2
+        hypothesis.covariance = jacobian @ covariance @ jacobian.T + noise
 
     # --- looks ------------------------------------------------------------------------------------------------------
 
@@ -258,17 +273,21 @@ class PoseFilter:
         """Update (EKF measurement update) by a look's boxes, at least one."""
         if self._stepped and self.hypotheses:
             self._nis += _NIS_GAIN * (self.nis(boxes) - self._nis)
-        self._stepped = False
+        branched, self._stepped = self._stepped, False
         if not self.hypotheses:
             self.hypotheses = self._guesses(boxes)
-        self._take(view(boxes, self._edges))
+        self._take(view(boxes, self._edges), branched)
         if not self.hypotheses:
             self.hypotheses = self._guesses(boxes)
             self._take(view(boxes, self._edges))
 
-    def _take(self, seen: View) -> None:
+    def _take(self, seen: View, branched: bool = False) -> None:
         for hypothesis in self.hypotheses:
             self._looks.update(hypothesis, seen)
+        if branched:
+            self._models.judge(
+                [(hypothesis.model, hypothesis.cost) for hypothesis in self.hypotheses if hypothesis.sane]
+            )
         self._prune()
 
     def plausible(self, blocks: Sequence[Block]) -> list[Block]:

@@ -37,11 +37,14 @@ guesses go to 92 degrees."""
 
 @dataclass
 class Hypothesis:
-    """State (6,) and covariance (6, 6) as in `marker_projection`, and -2 log likelihood of all looks."""
+    """State (6,) and covariance (6, 6) as in `marker_projection`, -2 log likelihood of all looks, and by which of the
+    step models (number) it followed the neighbour's last step.
+    """
 
     state: Vector
     covariance: Matrix
     cost: float = 0.0
+    model: int = 0
 
     @property
     def sane(self) -> bool:

@@ -23,6 +23,7 @@ from robot_formation.alignment.precise.motion_planner import MotionPlanner, Plan
 from robot_formation.alignment.precise.neighbour_search import NeighbourSearch, SearchParameters
 from robot_formation.alignment.precise.pose_filter import FilterParameters, PoseFilter
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.uncertain_motion import UncertainMotion, composition_jacobians
 from robot_formation.parameters import parameter
 from robot_formation.vision.marker import Face
 
@@ -48,8 +49,6 @@ _UNKNOWN_HEADING_RAD = 0.08
 """Standard deviation of the heading from which on it counts as hardly known."""
 _ASIDE_RAD = 0.25
 """Bearing of the neighbour, from straight aside, from which on a follower that hardly knows its heading turns first."""
-_FIRST_SIDESTEP_SIGMA_M = 0.002
-"""Standard deviation of the neighbour's way aside in its first step, before the follower knows its own slip."""
 
 
 @dataclass(frozen=True)
@@ -99,32 +98,39 @@ class PreciseParameters:
 class PreciseAlignment:
     """Keeps the estimate over the timesteps; one decision a look."""
 
-    def __init__(self, parameters: PreciseParameters, first_step_m: float, formation_distance_m: float) -> None:
+    def __init__(self, parameters: PreciseParameters, formation_distance_m: float) -> None:
         self._p = parameters
-        self._filter = PoseFilter(MarkerModel(parameters.geometry), parameters.edges, parameters.filter)
+        drive = parameters.actuation
+        self._filter = PoseFilter(
+            MarkerModel(parameters.geometry),
+            parameters.edges,
+            parameters.filter,
+            drive.least_leg_m,
+            drive.wheel_lever_m,
+        )
         self._planner = MotionPlanner(parameters.approach)
         self._actuation = ActuationModel(parameters.actuation, parameters.filter.move_floor_m)
         self._search = NeighbourSearch(parameters.search)
-        self._step_m = first_step_m
         self._formation = Motion(y_m=-formation_distance_m)  # position in the neighbour's frame
         self._moves = 0
         self._timestep = 0
         self._last = Motion()
+        self._way: UncertainMotion | None = None  # to the formation position, since the last look by forecast and moves
         self._viewpoints: list[float] | None = None  # those still to be visited; None: not chosen yet
 
-    def restart(self, timestep: int) -> None:
+    def restart(self, timestep: int, step: UncertainMotion | None = None) -> None:
         """Begin a timestep: the neighbour has made its step."""
         self._moves = 0
         self._timestep = timestep
         self._last = Motion()
-        if timestep > 0:
-            self._filter.neighbour_stepped(
-                Motion(self._step_m, self._actuation.slip * self._step_m),
-                self._actuation.overshoot,
-                None if self._actuation.drives else _FIRST_SIDESTEP_SIGMA_M,
-            )
+        if timestep == 0:
+            return
+        step = step or UncertainMotion(Motion())
+        self._way = None if self._way is None else self._way.then(step)
+        neighbours = step.between(self._formation, self._formation.inverse())
+        self._filter.neighbour_stepped(neighbours, self._actuation.drives_so_far, timestep == 1)
 
-    def turn(self) -> float:
+    def turn(self, forecast_rad: float) -> float:
         """Return the turn [rad] to make with the prediction move."""
         if not self._filter.known:
             return 0.0
@@ -136,10 +142,20 @@ class PreciseAlignment:
         self._filter.moved(motion)
         self._actuation.moved(asked, motion)
         self._last = motion
+        self._way = None if self._way is None else self._way.after(motion)
 
-    def offset(self) -> Motion | None:
+    def offset(self) -> UncertainMotion | None:
         """Estimate the way to the formation position in the follower's frame."""
-        return pose_of(self._filter.best.state).then(self._formation) if self._filter.known else None
+        if not self._filter.known:
+            return None
+        best = self._filter.best
+        by_pose, _ = composition_jacobians(pose_of(best.state), self._formation)
+        covariance = by_pose @ best.covariance[:3, :3] @ by_pose.T
+        return UncertainMotion.of(pose_of(best.state).then(self._formation), covariance)
+
+    def ahead(self) -> UncertainMotion | None:
+        """Estimate that way without a look: from the last look on, by forecasts and moves."""
+        return self._way
 
     def assess(self, frames: Frames) -> Decision:
         """Decide what the last look calls for."""
@@ -150,12 +166,14 @@ class PreciseAlignment:
             self._filter.forget()
             strange = False
         if not boxes or strange:
-            decision = self._search.missed(self._last if self._moves else Motion(), self.offset())
+            offset = self.offset()
+            decision = self._search.missed(self._last if self._moves else Motion(), offset.mean if offset else None)
             self._moves += count_legs(decision.motion)
             return decision
         self._search.found()
         first = not self._filter.known
         self._filter.look(boxes)
+        self._way = self.offset()
         if first and set(boxes) == {Face.TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             self._viewpoints = []

@@ -1,6 +1,16 @@
 """Predictors of the follower's next displacement."""
 
+from robot_formation.koopman.predictors.horizon import Ahead
 from robot_formation.koopman.predictors.parameters import NAMES, PredictorParameters
 from robot_formation.koopman.predictors.predictor import DESCRIPTIONS, MODELS, Forecast, PredictionError, Predictor
 
-__all__ = ["DESCRIPTIONS", "MODELS", "NAMES", "Forecast", "PredictionError", "Predictor", "PredictorParameters"]
+__all__ = [
+    "DESCRIPTIONS",
+    "MODELS",
+    "NAMES",
+    "Ahead",
+    "Forecast",
+    "PredictionError",
+    "Predictor",
+    "PredictorParameters",
+]

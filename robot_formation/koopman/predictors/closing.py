@@ -6,21 +6,28 @@ the robot does differs from what it is told by its actuation bias b (slip, run-o
 
 The camera's residual is noisy (a pixel of side length is 6 mm along u), so r and w are estimated together by a Kalman
 filter: the total is known well, the camera says what is left. A model forecasts from the filtered w.
+
+With turns, r and w are motions in the plane: the ideal motion is total_t o r_t = r_(t-1) o w_t, o being composition
+(the second motion's translation is rotated by the first one's turn). Without any turn this is the sum above.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
-from robot_formation.koopman.predictors.models import Diagnostics, Matrix, Model, TrendFilter, Vector, array, covariance
+from robot_formation.koopman.predictors.models import Diagnostics, Matrix, TrendFilter, Vector, array, covariance
 from robot_formation.koopman.predictors.parameters import ClosingParameters
+from robot_formation.koopman.predictors.spatial import Spatial, after, rotated
 
 # A move that ends farther from its command has met an obstacle or was never carried out.
 _LARGEST_BIAS_M = 0.03
+_LARGEST_BIAS_RAD = 0.1
 # Degrees of freedom of the innovations' distribution (Student): an outlier must not decide.
 NU = 5.0
 _ONWARD = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -29,32 +36,41 @@ _ONWARD = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 class ResidualFilter:
     """Bank of Kalman filters of residual r, leader-induced displacement w and its damped trend; each axis by itself.
 
+    The axes are u and v, or the turn alone.
+
     r_t = r_(t-1) + w_t + noise - total_t, w_(t+1) = w_t + damping trend_t + noise, and the camera measures r_t. The
     filters differ in how fast they let w change; they are weighted by the likelihood of their past innovations, older
     ones discounted. Shapes: (filters, axes, 3) for means (r, w, trend), (filters, axes, 3, 3) for covariances.
     """
 
-    def __init__(self, parameters: ClosingParameters) -> None:
+    def __init__(self, parameters: ClosingParameters, *, turn: bool = False) -> None:
+        """Make the bank of u and v [m], or that of the turn [rad], whose lists are those of u and v times a scale."""
         p = self._p = parameters
         count = len(p.noise_m)
-        self._camera = np.array([p.residual_u_m, p.residual_v_m]) ** 2
-        start = np.array([[0.0, p.step_u_m, 0.0], [0.0, p.step_v_m, 0.0]])
+        scale = p.rad_per_m if turn else 1.0
+        if turn:
+            self._camera = np.array([p.residual_turn_rad]) ** 2
+            start = np.array([[0.0, p.step_turn_rad, 0.0]])
+            sigmas = np.array([[p.start_turn_rad, p.step_sigma_turn_rad, scale * p.trend_start_m]])
+        else:
+            self._camera = np.array([p.residual_u_m, p.residual_v_m]) ** 2
+            start = np.array([[0.0, p.step_u_m, 0.0], [0.0, p.step_v_m, 0.0]])
+            sigmas = np.array(
+                [[p.start_u_m, p.step_sigma_u_m, p.trend_start_m], [p.start_v_m, p.step_sigma_v_m, p.trend_start_m]]
+            )
         self._means = np.repeat(start[None], count, axis=0)
-        sigmas = np.array(
-            [[p.start_u_m, p.step_sigma_u_m, p.trend_start_m], [p.start_v_m, p.step_sigma_v_m, p.trend_start_m]]
-        )
         self._covariances: NDArray[np.float64] = np.repeat((np.eye(3) * sigmas[:, None, :] ** 2)[None], count, axis=0)
         self._go = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, p.trend_damping], [0.0, 0.0, p.trend_damping]])
-        self._noise = np.square(p.noise_m)[:, None]
+        self._noise = np.square(scale * np.array(p.noise_m))[:, None]
         self._drift = np.zeros((count, 1, 3, 3))
-        self._drift[:, 0, 1, 1] = np.square(p.level_m)
-        self._drift[:, 0, 2, 2] = np.square(p.trend_m)
-        self._losses: Matrix = np.zeros((count, 2))
+        self._drift[:, 0, 1, 1] = np.square(scale * np.array(p.level_m))
+        self._drift[:, 0, 2, 2] = np.square(scale * np.array(p.trend_m))
+        self._losses: Matrix = np.zeros((count, len(start)))
         self.weights: Matrix = self._weighted()
         """Weight of each filter for each axis, (filters, axes)."""
 
     def observe(self, total: Vector, residual: Vector | None) -> None:
-        """Update with the total displacement (2,) of a timestep and the camera's residual (2,), None if it saw none."""
+        """Update with the total (axes,) of a timestep and the camera's residual (axes,), None if it saw none."""
         means = self._means @ _ONWARD.T
         means[..., 0] -= total
         covariances = _ONWARD @ self._covariances @ _ONWARD.T
@@ -78,13 +94,17 @@ class ResidualFilter:
 
     @property
     def residual(self) -> Vector:
-        """Estimated residual (2,)."""
+        """Estimated residual (axes,)."""
         return np.asarray((self.weights * self._means[..., 0]).sum(axis=0))
 
     @property
     def step(self) -> Vector:
-        """Estimated leader-induced displacement of the timestep to come (2,)."""
+        """Estimated leader-induced displacement of the timestep to come (axes,)."""
         return np.asarray((self.weights * self._means[..., 1]).sum(axis=0))
+
+    def shift(self, change: Vector) -> None:
+        """Add a change (axes,) to every filter's residual: the frame in which it is told has changed."""
+        self._means[..., 0] += change
 
     def state(self) -> JsonObject:
         """Return all that it has learned."""
@@ -102,63 +122,153 @@ class ResidualFilter:
         self.weights = self._weighted()
 
 
+class ClosedResidual:
+    """Residual and leader-induced motion w as (u, v, turn), estimated by a bank of u and v and one of the turn."""
+
+    def __init__(self, parameters: ClosingParameters) -> None:
+        self._uv = ResidualFilter(parameters)
+        self._turn = ResidualFilter(parameters, turn=True)
+        self.seen = False
+        """Whether any residual was known yet."""
+        self.turn_seen = False
+        """Whether any residual's turn was known yet."""
+
+    def observe(self, total: Vector, residual: Vector | None) -> None:
+        """Update with a timestep's total (3,) and the residual (3,) at its end; its turn may be NaN, unknown."""
+        turn_seen = residual is not None and not math.isnan(residual[2])
+        before = float(self._turn.residual[0]) if self.turn_seen else 0.0
+        self.seen = self.seen or residual is not None
+        self.turn_seen = self.turn_seen or turn_seen
+        if self.turn_seen:
+            self._turn.observe(total[2:], residual[2:] if turn_seen and residual is not None else None)
+        if before:  # w is told in the frame of the place that the robot should have had
+            self._uv.shift(rotated(self._uv.step, before) - self._uv.step)
+        turn = float(total[2])
+        seen = None if residual is None else rotated(residual[:2], turn)
+        self._uv.observe(total[:2], seen)
+        if turn:  # the filter's residual is told in the frame at the timestep's start; on to that at its end
+            self._uv.shift(rotated(self._uv.residual, -turn) - self._uv.residual)
+
+    @property
+    def residual(self) -> Vector:
+        """Estimated residual (3,)."""
+        return np.append(self._uv.residual, self._turn.residual if self.turn_seen else 0.0)
+
+    @property
+    def step(self) -> Vector:
+        """Estimated leader-induced displacement (u, v) of the timestep to come, (2,)."""
+        return self._uv.step
+
+    @property
+    def turn_step(self) -> Vector:
+        """Estimated leader-induced turn of the timestep to come, (1,)."""
+        return self._turn.step
+
+    def state(self) -> JsonObject:
+        """Return all that it has learned."""
+        return {
+            "uv": self._uv.state(),
+            "turn": self._turn.state(),
+            "seen": self.seen,
+            "turn_seen": self.turn_seen,
+        }
+
+    def restore(self, state: Mapping[str, Json]) -> None:
+        """Restore what `state` returned."""
+        self._uv.restore(state["uv"])
+        self._turn.restore(state["turn"])
+        self.seen, self.turn_seen = bool(state["seen"]), bool(state["turn_seen"])
+
+
+class ActuationBias:
+    """By how much the robot goes farther than it is told, (u, v, turn); found by a filter of level and trend."""
+
+    def __init__(self, parameters: ClosingParameters) -> None:
+        self._uv, self._turn = TrendFilter(parameters.bias), TrendFilter(parameters.bias, 1)
+        self._uv.start(np.zeros(2), parameters.bias_m)
+        self._turn.start(np.zeros(1), parameters.bias_m)  # the gains depend on ratios only: metres do for radians
+
+    def observe(self, displacement: Vector, commanded: Vector) -> None:
+        """Update with a total (3,) and what it would have been had the robot gone as told (3,)."""
+        bias = displacement - commanded
+        if np.abs(bias[:2]).max() <= _LARGEST_BIAS_M and abs(bias[2]) <= _LARGEST_BIAS_RAD:
+            self._uv.observe(bias[:2])
+            self._turn.observe(bias[2:])
+
+    def forecast(self) -> Vector:
+        """Forecast the bias of the next timestep (3,)."""
+        return np.append(self._uv.forecast(), self._turn.forecast())
+
+    def state(self) -> JsonObject:
+        """Return all that it has learned."""
+        return {"uv": self._uv.state(), "turn": self._turn.state()}
+
+    def restore(self, state: Mapping[str, Json]) -> None:
+        """Restore what `state` returned."""
+        self._uv.restore(state["uv"])
+        self._turn.restore(state["turn"])
+
+
 class Closing:
     """A model of w, with the residual closed and the actuation bias learned."""
 
-    def __init__(
-        self, parameters: ClosingParameters, model: Model, judge: Callable[[Vector], None] | None = None
-    ) -> None:
-        """Wrap a model in residual feedback; `judge` is told every w as the camera saw it, before the model gets it."""
+    def __init__(self, parameters: ClosingParameters, model: Spatial) -> None:
+        """Wrap a model in residual feedback."""
         self._model = model
-        self._judge = judge
-        self._filter = ResidualFilter(parameters)
-        self._bias = TrendFilter(parameters.bias)
-        self._bias.start(np.zeros(2), parameters.bias_m)
-        self._seen = False
+        self._filter = ClosedResidual(parameters)
+        self._bias = ActuationBias(parameters)
 
     def observe(self, displacement: Vector, residual: Vector | None, commanded: Vector | None) -> None:
         """Update with a timestep's total displacement, the camera's residual and the command, where they are known."""
         if commanded is not None:
-            bias = displacement - commanded
-            if np.abs(bias).max() <= _LARGEST_BIAS_M:
-                self._bias.observe(bias)
-        self._seen = self._seen or residual is not None
-        if not self._seen:  # nothing is known about residuals: displacements are all there is
+            self._bias.observe(displacement, commanded)
+        found, blind = self._filter, residual is None
+        if blind and not found.seen:  # nothing is known about residuals: displacements are all there is
             self._model.observe(displacement)
             return
-        if self._judge is not None and residual is not None:
-            self._judge(displacement + residual - self._filter.residual)
-        self._filter.observe(displacement, residual)
-        self._model.observe(self._filter.step)
+        found.observe(displacement, residual)
+        if blind:
+            self._model.advance()
+        else:
+            self._model.observe(np.append(found.step, found.turn_step if found.turn_seen else displacement[2:]))
 
     def forecast(self) -> Vector:
-        """Forecast the next ideal move (2,)."""
-        return self._model.forecast() + self._filter.residual if self._seen else self._model.forecast()
+        """Forecast the next ideal move (3,)."""
+        return np.asarray(self.ahead(1)[0])
+
+    def ahead(self, steps: int) -> Matrix:
+        """Forecast the next displacements (steps, 3): the next ideal move, then what follows if nothing is left."""
+        found = self._model.ahead(steps)
+        if self._filter.seen:
+            residual = self._filter.residual
+            found[0] = after(residual, found[0])
+        return found
+
+    def step(self) -> Vector:
+        """Forecast what the leader will induce next (3,), in the frame of the place where no residual is left."""
+        return np.asarray(self._model.ahead(1)[0])
 
     def bias(self) -> Vector:
-        """By how much the robot is expected to go farther than it is told, (2,)."""
+        """By how much the robot is expected to go farther than it is told, (3,)."""
         return self._bias.forecast()
 
     def diagnostics(self) -> Diagnostics:
         """Show the inner model, and the filtered residual and the bias beside it."""
         inner = self._model.diagnostics()
         notes = dict(inner.notes or {})
-        for name, value in (("residual [m]", self._filter.residual), ("actuation bias [m]", self.bias())):
+        residual, bias = self._filter.residual, self.bias()
+        for name, value in (("residual [m]", residual[:2]), ("actuation bias [m]", bias[:2])):
             notes[name] = np.array2string(value, precision=6, separator=", ")
-        return Diagnostics(inner.k, inner.condition_number, inner.innovation, notes)
+        for name, turn in (("residual turn [rad]", residual[2]), ("actuation bias of the turn [rad]", bias[2])):
+            notes[name] = f"{turn:.6g}"
+        return replace(inner, notes=notes)
 
     def state(self) -> JsonObject:
         """Return all that it has learned."""
-        return {
-            "model": self._model.state(),
-            "filter": self._filter.state(),
-            "bias": self._bias.state(),
-            "seen": self._seen,
-        }
+        return {"model": self._model.state(), "filter": self._filter.state(), "bias": self._bias.state()}
 
     def restore(self, state: Mapping[str, Json]) -> None:
         """Restore what `state` returned."""
         self._model.restore(state["model"])
         self._filter.restore(state["filter"])
         self._bias.restore(state["bias"])
-        self._seen = bool(state["seen"])

@@ -8,7 +8,8 @@ from robot_formation.parameters import ParameterError, parameter
 
 CLOSABLE = ("previous", "ewma", "kalman_trend", "measured", "edmd")
 """Models that may run with residual closing and bias learning, as NAME+close."""
-NAMES = (*CLOSABLE, "literal", "formation", *(f"{name}+close" for name in CLOSABLE))
+TREND_CLOSE = "trend+close"
+NAMES = (*CLOSABLE, "literal", "formation", *(f"{name}+close" for name in CLOSABLE), TREND_CLOSE)
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,17 @@ class ClosingParameters:
     )
     step_sigma_u_m: float = parameter(0.003, "Standard deviation of it along u", unit="m", low=1e-6, high=1.0)
     step_sigma_v_m: float = parameter(0.0025, "Standard deviation of it along v", unit="m", low=1e-6, high=1.0)
+    residual_turn_rad: float = parameter(
+        0.012, "Standard deviation of the camera's residual turn", unit="rad", low=1e-6, high=3.2
+    )
+    start_turn_rad: float = parameter(
+        0.02, "Standard deviation of the residual turn before timestep 1", unit="rad", low=1e-6, high=3.2
+    )
+    step_turn_rad: float = parameter(0.0, "Leader-induced turn known beforehand", unit="rad", low=-3.2, high=3.2)
+    step_sigma_turn_rad: float = parameter(0.006, "Standard deviation of it", unit="rad", low=1e-6, high=3.2)
+    rad_per_m: float = parameter(
+        3.0, "Turns are filtered with the lengths below times this", unit="rad/m", low=1e-6, high=1000.0
+    )
     noise_m: tuple[float, ...] = parameter(
         (0.0016, 0.0025, 0.005),
         "Filters: standard deviation of the leader-induced displacement about its level",
@@ -133,19 +145,63 @@ class ClosingParameters:
 
 
 @dataclass(frozen=True)
-class FormationParameters:
-    """The project's own predictor: models combined by how well each has forecast lately, residual and bias closed."""
+class OscillatorParameters:
+    """Bank of Koopman oscillators: periods in timesteps, evenly spaced in the root of frequency."""
 
+    shortest: float = parameter(5.0, "Shortest period", unit="timesteps", low=2.1, high=1000.0)
+    longest: float = parameter(80.0, "Longest period", unit="timesteps", low=2.1, high=10000.0)
+    count: int = parameter(72, "How many periods", low=2, high=1000)
+    level_start_m: float = parameter(0.02, "Standard deviation of the level at first", unit="m", low=1e-6, high=1.0)
+    amplitude_m: float = parameter(0.03, "Standard deviation of amplitudes at first", unit="m", low=1e-6, high=1.0)
+    noise_m: float = parameter(
+        0.0016, "Standard deviation of the leader-induced displacement about the model", unit="m", low=1e-6, high=1.0
+    )
+    level_m: float = parameter(0.0002, "Standard deviation of the level's change", unit="m", low=0.0, high=1.0)
+    change_m: float = parameter(0.0004, "Standard deviation of the amplitudes' change", unit="m", low=0.0, high=1.0)
+    discount: float = parameter(0.95, "Weight of a past innovation relative to the next newer one", low=0.01, high=1.0)
+
+
+@dataclass(frozen=True)
+class FormationParameters:
+    """The project's own predictor: experts combined per axis by how well each has forecast lately."""
+
+    aggregation: str = parameter(
+        "exponential",
+        "How experts are combined: discounted exponential weights, or ML-Poly, which has no learning rate",
+        choices=("exponential", "ml_poly"),
+    )
     discount: float = parameter(0.9, "Weight of a past error relative to the next newer one", low=0.01, high=1.0)
     initial_loss: float = parameter(
-        1.0,
-        "How much the Koopman model is behind persistence at first (logarithm of the weights' ratio)",
+        2.0,
+        "How much other experts are behind persistence at first (logarithm of the weights' ratio)",
         low=0.0,
         high=100.0,
     )
-    scale_u_m: float = parameter(0.006, "Error along u that makes a model unlikely", unit="m", low=1e-6, high=1.0)
-    scale_v_m: float = parameter(0.003, "Error along v that makes a model unlikely", unit="m", low=1e-6, high=1.0)
-    edmd: EdmdParameters = EdmdParameters(prior=1.0, forgetting=0.9)
+    coupling: float = parameter(
+        0.3, "Share of the error along u that counts along v, and the other way round", low=0.0, high=1.0
+    )
+    scale_u_m: float = parameter(0.006, "Error along u that makes an expert unlikely", unit="m", low=1e-6, high=1.0)
+    scale_v_m: float = parameter(0.003, "Error along v that makes an expert unlikely", unit="m", low=1e-6, high=1.0)
+    trend_m: tuple[float, ...] = parameter(
+        (0.002, 0.004),
+        "Trend filters beside those of the closing: standard deviation of the trend's change in a timestep",
+        unit="m",
+        low=0.0,
+        high=1.0,
+    )
+    trend_damping: tuple[float, ...] = parameter(
+        (1.0, 0.95), "Trend filters: share of the trend that is left after a timestep", low=0.0, high=1.0
+    )
+    trend_start_m: float = parameter(
+        0.002, "Trend filters: standard deviation of the trend at first", unit="m", low=0.0, high=1.0
+    )
+    edmd: EdmdParameters = EdmdParameters(dictionary="constant delay:3", prior=0.05)
+    oscillators: OscillatorParameters = OscillatorParameters()
+
+    def __post_init__(self) -> None:
+        """Check that every trend filter has its two numbers."""
+        if len(self.trend_m) != len(self.trend_damping):
+            raise ParameterError("predictor: 'formation.trend_m' and 'trend_damping' need one number for each filter")
 
 
 @dataclass(frozen=True)
@@ -163,6 +219,10 @@ class PredictorParameters:
     )
     sigma_v_m: float = parameter(
         0.0025, "Standard deviation of a forecast along v before errors tell", unit="m", low=0.0, high=1.0
+    )
+    max_turn_rad: float = parameter(0.35, "Bound of the forecast turn", unit="rad", low=0.0, high=3.2)
+    sigma_turn_rad: float = parameter(
+        0.01, "Standard deviation of a forecast turn before errors tell", unit="rad", low=0.0, high=3.2
     )
     sigma_weight: float = parameter(2.0, "How many forecasts these standard deviations count for", low=0.01, high=1e6)
     sigma_discount: float = parameter(

@@ -1,6 +1,7 @@
 """Predictors of the follower's next displacement, behind one protocol.
 
-State x_t = (u_t, v_t): the follower's measured total displacement of timestep t, metres, u to the right and v forward.
+State x_t = (u_t, v_t, turn_t): the follower's measured total displacement of timestep t in its frame at the timestep's
+start, u [m] to the right, v [m] forward, turn [rad] anticlockwise. A Koopman model's K is that of (u, v).
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.linear_algebra import KoopmanError
 from robot_formation.koopman.predictors.closing import Closing
 from robot_formation.koopman.predictors.dmd import Edmd, Literal, Measured
-from robot_formation.koopman.predictors.formation import Mixture
+from robot_formation.koopman.predictors.formation import MixedExperts
+from robot_formation.koopman.predictors.horizon import MOST_STEPS, Ahead, HorizonErrors
 from robot_formation.koopman.predictors.models import (
     Diagnostics,
     Ewma,
@@ -30,12 +32,14 @@ from robot_formation.koopman.predictors.models import (
     optional,
     vector,
 )
-from robot_formation.koopman.predictors.parameters import CLOSABLE, NAMES, PredictorParameters
+from robot_formation.koopman.predictors.parameters import CLOSABLE, NAMES, TREND_CLOSE, PredictorParameters
+from robot_formation.koopman.predictors.spatial import Spatial, after, between, ways
 from robot_formation.parameters import suggestion
 
 # Nothing moves or is measured so finely: what is less is rounding, and dividing by it makes no sense.
 _FINEST_M = 1e-9
 CLOSE = "+close"
+_FORMAT = 2  # of states; 1 knew no turns and had no number
 
 MODELS: dict[str, Callable[[PredictorParameters], Model]] = {
     "previous": Previous,
@@ -44,8 +48,19 @@ MODELS: dict[str, Callable[[PredictorParameters], Model]] = {
     "literal": Literal,
     "measured": Measured,
     "edmd": Edmd,
-    "formation": Mixture,
 }
+"""Models of (u, v)."""
+
+EXPERTS: dict[str, tuple[str, ...]] = {
+    "formation": (
+        "persistence", "trends", "oscillators", "overtones", "rotation", "dmd", "delays 3", "delays 6",
+    ),
+    TREND_CLOSE: ("trends",),
+}  # fmt: skip
+"""Predictors that are made of experts, and of which."""
+
+TURN_MODELS: dict[str, Callable[[PredictorParameters, int], Model]] = {"ewma": Ewma, "kalman_trend": KalmanTrend}
+"""Models of the turn by itself; for the others the previous turn."""
 
 DESCRIPTIONS: dict[str, str] = {
     "previous": 'the paper\'s "without prediction": the previous displacement',
@@ -54,19 +69,20 @@ DESCRIPTIONS: dict[str, str] = {
     "measured": "online DMD with measured pairs: the paper's algorithm as it must be meant",
     "edmd": "online EDMD with a dictionary of yours (predictor.edmd.dictionary) and a prior",
     "literal": "the paper's Algorithm 1 as printed, which is blind after three displacements",
-    "formation": "the project's own: residual and actuation bias closed, persistence and EDMD weighted",
+    "formation": "the project's own: closing, with filters, Koopman oscillators and delay-embedded DMD weighted",
     **{f"{name}{CLOSE}": f"{name}, with residual and actuation bias closed" for name in CLOSABLE},
+    TREND_CLOSE: "Kalman filters of levels and trends, with residual and actuation bias closed; no Koopman operator",
 }
 """What each of `NAMES` is, in a line."""
 
 
 class Forecast(NamedTuple):
-    """What a predictor says of the next timestep; (u, v) in metres.
+    """What a predictor says of the next timestep; (u, v, turn) in metres and radians.
 
     Attributes:
-        mean: (2,) the ideal move: the displacement that leaves no residual.
-        covariance: (2, 2) of the ideal move about `mean` [m^2].
-        command: (2,) what to command so that `mean` is what the robot does: without the actuation bias, where the
+        mean: (3,) the ideal move: the displacement that leaves no residual.
+        covariance: (3, 3) of the ideal move about `mean` [m^2, m rad, rad^2].
+        command: (3,) what to command so that `mean` is what the robot does: without the actuation bias, where the
             predictor has learned one.
     """
 
@@ -76,7 +92,7 @@ class Forecast(NamedTuple):
 
     @property
     def about_command(self) -> Matrix:
-        """Second moment (2, 2) of the ideal move about `command` [m^2]."""
+        """Second moment (3, 3) of the ideal move about `command` [m^2, m rad, rad^2]."""
         bias = self.mean - self.command
         return self.covariance + np.outer(bias, bias)
 
@@ -93,19 +109,22 @@ class Predictor:
         name = parameters.name
         if name not in NAMES:
             raise PredictionError(f"no predictor '{name}'{suggestion(name, NAMES)}")
-        self._model = MODELS[name.removesuffix(CLOSE)](parameters)
-        self._closing: Closing | None = None
-        if isinstance(self._model, Mixture):
-            self._closing = Closing(parameters.closing, self._model, self._model.judge)
-        elif name.endswith(CLOSE):
-            self._closing = Closing(parameters.closing, self._model)
-        # Plain numbers: NumPy's overhead on two of them would be most of a predictor's cost.
+        inner = name.removesuffix(CLOSE)
+        self._closing: Closing | MixedExperts | None = None
+        if name in EXPERTS:
+            self._closing = MixedExperts(parameters, EXPERTS[name])
+        else:
+            self._model = Spatial(MODELS[inner](parameters), TURN_MODELS.get(inner, Previous)(parameters, 1))
+            if name.endswith(CLOSE):
+                self._closing = Closing(parameters.closing, self._model)
         self._weight = parameters.sigma_weight
-        self._uu = parameters.sigma_u_m**2 * self._weight
-        self._uv = 0.0
-        self._vv = parameters.sigma_v_m**2 * self._weight
-        self._largest_u_m, self._largest_v_m = 10.0 * parameters.max_u_m, 10.0 * parameters.max_v_m
+        sigmas = np.array([parameters.sigma_u_m, parameters.sigma_v_m, parameters.sigma_turn_rad])
+        self._errors: Matrix = np.diag(sigmas**2 * self._weight)
+        self._horizon = HorizonErrors(parameters.sigma_discount, parameters.sigma_weight)
+        self._bounds = np.array([parameters.max_u_m, parameters.max_v_m, parameters.max_turn_rad])
+        self._largest = tuple((10.0 * self._bounds).tolist())
         self._expected: Vector | None = None
+        self._seen = False
         self.observations = 0
 
     @property
@@ -114,40 +133,45 @@ class Predictor:
         return self.parameters.name
 
     def observe(self, displacement: Vector, residual: Vector | None = None, commanded: Vector | None = None) -> None:
-        """Update with a finished timestep: total displacement (2,), camera residual (2,), commanded displacement (2,).
+        """Update with a finished timestep: total displacement (3,), camera residual (3,), commanded displacement (3,).
 
-        `commanded` is what the total would have been had the prediction move gone as commanded.
+        `commanded` is what the total would have been had the prediction move gone as commanded. The residual's turn
+        may be NaN: the camera doesn't know it. Without a residual, the timestep was a blind one if there was a residual
+        before: models go on by their own forecasts and learn nothing. If there never was one, displacements are all
+        there is, and models learn from them.
 
         Raises:
             PredictionError: if a component is not finite or longer than ten times the bound.
         """
-        x, u, v = self._checked("displacement", displacement)
-        r = c = None
-        residual_u = residual_v = 0.0
-        if residual is not None:
-            r, residual_u, residual_v = self._checked("residual", residual)
-        if commanded is not None:
-            c, _, _ = self._checked("commanded displacement", commanded)
-        if abs(u) < _FINEST_M:
-            x[0] = u = 0.0
-        if abs(v) < _FINEST_M:
-            x[1] = v = 0.0
+        x = self._checked("displacement", displacement)
+        r = None if residual is None else self._checked("residual", residual, turn_unknown=True)
+        c = None if commanded is None else self._checked("commanded displacement", commanded)
+        x[np.abs(x) < _FINEST_M] = 0.0
+        blind = r is None and self._seen
+        self._seen = self._seen or r is not None
         if self._closing is not None:
             self._closing.observe(x, r, c)
-            mean = self._closing.forecast()
+        elif blind:
+            self._model.advance()
         else:
             self._model.observe(x)
-            mean = self._model.forecast()
-        if self._expected is not None:
-            expected_u, expected_v = self._expected.tolist()
-            error_u, error_v = u + residual_u - expected_u, v + residual_v - expected_v
-            keep = self.parameters.sigma_discount
-            self._uu = keep * self._uu + error_u * error_u
-            self._uv = keep * self._uv + error_u * error_v
-            self._vv = keep * self._vv + error_v * error_v
-            self._weight = keep * self._weight + 1.0
+        self._judge(x, r, blind)
         self.observations += 1
-        self._expected = self._bounded(mean)
+        steps = self._steps(MOST_STEPS)
+        self._expected = steps[0]
+        self._horizon.forecast(steps)
+
+    def _judge(self, x: Vector, r: Vector | None, blind: bool) -> None:
+        """Compare earlier forecasts with the ideal move of a timestep."""
+        known = None if blind else np.zeros(3) if r is None else r
+        if known is not None and math.isnan(known[2]):
+            known = np.append(known[:2], 0.0)
+        self._horizon.observe(x, known)
+        if self._expected is None or known is None:
+            return
+        error = after(x, known) - self._expected
+        self._errors = self.parameters.sigma_discount * self._errors + np.outer(error, error)
+        self._weight = self.parameters.sigma_discount * self._weight + 1.0
 
     def predict(self) -> Forecast:
         """Forecast the next timestep.
@@ -159,17 +183,51 @@ class Predictor:
             raise PredictionError("nothing to predict from: no displacement was observed yet")
         mean = self._expected.copy()
         command = mean.copy() if self._closing is None else self._bounded(mean - self._closing.bias())
-        uv = self._uv / self._weight
-        return Forecast(mean, np.array(((self._uu / self._weight, uv), (uv, self._vv / self._weight))), command)
+        return Forecast(mean, self._errors / self._weight, command)
+
+    def step(self, residual: Vector | None) -> Vector:
+        """Forecast what the leader will induce in the next timestep (3,), in the frame of the place without residual.
+
+        Args:
+            residual: the latest (3,), its turn may be NaN; None if unknown. Used where the predictor estimates none.
+
+        Raises:
+            PredictionError: before the first observation.
+        """
+        mean = self.predict().mean
+        if self._closing is not None:
+            return self._bounded(self._closing.step())
+        return mean if residual is None else between(np.nan_to_num(residual), mean)
+
+    def ahead(self, steps: int) -> list[Ahead]:
+        """Forecast the next timesteps, 1 to `steps`.
+
+        Raises:
+            PredictionError: before the first observation, or if `steps` is not positive.
+        """
+        if steps < 1:
+            raise PredictionError(f"a forecast is of 1 timestep or more, not of {steps}")
+        first = self.predict().covariance
+        means = self._steps(steps)
+        covariances, way_covariances = self._horizon.covariances(first, steps)
+        return list(map(Ahead, means, covariances, ways(means), way_covariances))
+
+    def _steps(self, count: int) -> Matrix:
+        """Forecast displacements (count, 3), bounded."""
+        steps = (self._model if self._closing is None else self._closing).ahead(count)
+        return self._bounded(steps)
 
     def state(self) -> JsonObject:
         """Return all that it has learned, as numbers, lists, text and None (JSON)."""
         return {
+            "format": _FORMAT,
             "name": self.name,
             "model": self._model.state() if self._closing is None else self._closing.state(),
-            "errors": [[self._uu, self._uv], [self._uv, self._vv]],
+            "errors": self._errors.tolist(),
             "weight": self._weight,
+            "horizon": self._horizon.state(),
             "expected": optional(self._expected),
+            "seen": self._seen,
             "observations": self.observations,
         }
 
@@ -178,47 +236,52 @@ class Predictor:
         """Make a predictor that goes on where another one's `state` was taken.
 
         Raises:
-            PredictionError: if the state is damaged, or of a predictor with another name or other parameters.
+            PredictionError: if the state is damaged, of an older version, or of a predictor with another name or other
+                parameters.
         """
         predictor = cls(parameters)
         try:
-            if state["name"] != parameters.name:
-                raise ValueError(f"it is of '{state['name']}', not of '{parameters.name}'")
-            (predictor._model if predictor._closing is None else predictor._closing).restore(state["model"])
-            (predictor._uu, predictor._uv), (_, predictor._vv) = covariance(state["errors"], 2, 2).tolist()
-            predictor._weight = float(array(state["weight"]))
-            if predictor._weight <= 0.0:
-                raise ValueError("its weight is not positive")
-            if state["expected"] is not None:
-                predictor._expected = predictor._bounded(vector(state["expected"]))
-            predictor.observations = int(state["observations"])
+            predictor._restore(state)
         except KeyError as error:
             raise PredictionError(f"the stored state of the predictor has no {error}") from None
         except (TypeError, ValueError, OverflowError, KoopmanError) as error:
             raise PredictionError(f"the stored state of the predictor can't be used: {error}") from None
         return predictor
 
+    def _restore(self, state: Mapping[str, Json]) -> None:
+        if state["name"] != self.name:
+            raise ValueError(f"it is of '{state['name']}', not of '{self.name}'")
+        if state.get("format") != _FORMAT:
+            raise ValueError("it was kept by an earlier version, which knew no turns; remove the file to begin anew")
+        (self._model if self._closing is None else self._closing).restore(state["model"])
+        self._errors = covariance(state["errors"], 3, 3)
+        self._weight = float(array(state["weight"]))
+        if self._weight <= 0.0:
+            raise ValueError("its weight is not positive")
+        self._horizon.restore(state["horizon"])
+        if state["expected"] is not None:
+            self._expected = self._bounded(vector(state["expected"], 3))
+        self._seen = bool(state["seen"])
+        self.observations = int(state["observations"])
+
     def diagnostics(self) -> Diagnostics:
         """Show K, condition number and innovation where the model has them."""
         return self._model.diagnostics() if self._closing is None else self._closing.diagnostics()
 
-    def _checked(self, what: str, value: Vector) -> tuple[Vector, float, float]:
-        """Return a copy of a vector (2,), and its components; refuse what no robot can do."""
+    def _checked(self, what: str, value: Vector, *, turn_unknown: bool = False) -> Vector:
+        """Return a copy of a vector (3,); refuse what no robot can do."""
         x = np.array(value, dtype=float)
-        u, v = x.tolist()
-        if abs(u) <= self._largest_u_m and abs(v) <= self._largest_v_m:  # never of NaN
-            return x, u, v
-        if not (math.isfinite(u) and math.isfinite(v)):
-            raise PredictionError(f"refused the {what} (u {u}, v {v}): not finite")
-        raise PredictionError(f"refused the {what} (u {u}, v {v}) m: no robot goes so far in a timestep")
+        u, v, turn = x.tolist()
+        largest_u, largest_v, largest_turn = self._largest
+        unknown = turn_unknown and math.isnan(turn)
+        if abs(u) <= largest_u and abs(v) <= largest_v and (unknown or abs(turn) <= largest_turn):  # never of NaN
+            return x
+        text = f"refused the {what} (u {u} m, v {v} m, turn {turn} rad)"
+        if not (math.isfinite(u) and math.isfinite(v) and (unknown or math.isfinite(turn))):
+            raise PredictionError(f"{text}: not finite")
+        raise PredictionError(f"{text}: no robot goes so far in a timestep")
 
     def _bounded(self, mean: Vector) -> Vector:
-        u, v = mean.tolist()
-        max_u_m, max_v_m = self.parameters.max_u_m, self.parameters.max_v_m
-        if abs(u) <= max_u_m and abs(v) <= max_v_m:
-            return mean
-        return np.array([_clipped(u, max_u_m), _clipped(v, max_v_m)])
-
-
-def _clipped(value: float, bound: float) -> float:
-    return 0.0 if math.isnan(value) else max(-bound, min(bound, value))
+        """Return vectors (..., 3) within the bounds, NaN as zero."""
+        found = np.clip(mean, -self._bounds, self._bounds)
+        return np.where(np.isnan(found), 0.0, found)

@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from predictor_helpers import HISTORY, predictor, timesteps
+from predictor_helpers import HISTORY, predictor, timesteps, whole
 from robot_formation.koopman.predictors import NAMES, PredictorParameters
 from robot_formation.koopman.predictors.closing import NU, Closing, ResidualFilter
-from robot_formation.koopman.predictors.formation import Mixture
 from robot_formation.koopman.predictors.models import Previous
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 from robot_formation.koopman.predictors.predictor import Predictor
+from robot_formation.koopman.predictors.spatial import Spatial
 from robot_formation.parameters import ParameterError
 
 Array = npt.NDArray[np.float64]
@@ -55,6 +55,7 @@ def test_one_filter_of_the_bank_is_the_textbooks_kalman_filter() -> None:
     p = ClosingParameters(noise_m=(0.002,), level_m=(0.001,), trend_m=(0.0005,))
     bank, books = ResidualFilter(p), [Textbook(p, axis, 0.002, 0.001, 0.0005) for axis in (0, 1)]
     for x, r, _ in timesteps(40):
+        x, r = x[:2], None if r is None else r[:2]
         bank.observe(x, r)
         for axis in (0, 1):
             books[axis].observe(x[axis], None if r is None else r[axis])
@@ -70,6 +71,7 @@ def test_the_bank_is_weighted_by_the_discounted_likelihood_of_its_innovations() 
     books = [[Textbook(p, axis, *setting) for axis in (0, 1)] for setting in settings]
     losses = np.zeros((len(settings), 2))
     for x, r, _ in timesteps(40, seed=1):
+        x, r = x[:2], None if r is None else r[:2]
         bank.observe(x, r)
         found = np.array(
             [[book.observe(x[i], None if r is None else r[i]) for i, book in enumerate(pair)] for pair in books],
@@ -106,32 +108,33 @@ def test_the_bank_needs_three_numbers_for_each_filter() -> None:
 
 
 def closing(**values: Any) -> Closing:
-    return Closing(ClosingParameters(**values), Previous(PredictorParameters()))
+    parameters = PredictorParameters()
+    return Closing(ClosingParameters(**values), Spatial(Previous(parameters), Previous(parameters, 1)))
 
 
 def test_without_any_residual_displacements_are_all_there_is() -> None:
     tested = closing()
     for x in HISTORY:
-        tested.observe(np.array(x), None, None)
-        assert (tested.forecast() == x).all()
+        tested.observe(whole(x), None, None)
+        assert (tested.forecast() == whole(x)).all()
     assert (tested.bias() == 0.0).all()
 
 
 def test_a_residual_that_is_unknown_now_and_then_is_carried_on_by_what_was_driven() -> None:
     tested = closing(residual_u_m=1e-5, residual_v_m=1e-5)
-    w = np.array([0.0, 0.05])
+    w = np.array([0.0, 0.05, 0.0])
     for _ in range(30):
-        tested.observe(w, np.zeros(2), None)
-    missed = np.array([0.0, 0.01])
+        tested.observe(w, np.zeros(3), None)
+    missed = np.array([0.0, 0.01, 0.0])
     tested.observe(w - missed, None, None)  # nobody saw that it fell short
     assert tested.forecast() == pytest.approx(w + missed, abs=1e-4)
 
 
 def test_moves_that_ended_far_from_their_command_teach_no_bias() -> None:
     tested = closing()
-    tested.observe(np.array([0.0, 0.05]), None, np.array([0.0, 0.0]))
+    tested.observe(whole((0.0, 0.05)), None, np.zeros(3))
     assert (tested.bias() == 0.0).all()
-    tested.observe(np.array([0.0, 0.05]), None, np.array([0.0, 0.045]))
+    tested.observe(whole((0.0, 0.05)), None, whole((0.0, 0.045)))
     assert tested.bias()[0] == 0.0
     assert 0.0 < tested.bias()[1] < 0.005
 
@@ -144,8 +147,8 @@ def follow(
     for _ in range(count):
         total = command + bias + rng.normal(0.0, noise_m, 2)
         r = r + w - total
-        found.observe(total, r + rng.normal(0.0, (0.006, 0.001)), command)
-        command = found.predict().command
+        found.observe(whole(total), whole(r + rng.normal(0.0, (0.006, 0.001))), whole(command))
+        command = found.predict().command[:2]
         residuals.append(r)
     return np.array(residuals)
 
@@ -156,7 +159,7 @@ def test_a_constant_bias_is_learned_and_the_leaders_step_found_and_no_residual_i
     found = predictor(name)
     residuals = follow(found, bias, w, 80, np.random.default_rng(5))
     forecast = found.predict()
-    assert forecast.mean - forecast.command == pytest.approx(bias, abs=0.001)
+    assert (forecast.mean - forecast.command)[:2] == pytest.approx(bias, abs=0.001)
     assert np.abs(residuals[40:].mean(axis=0)).max() < 0.0015
     assert np.abs(residuals[40:]).max() < 0.012
 
@@ -165,54 +168,8 @@ def test_the_forecast_is_that_of_the_model_plus_the_filtered_residual() -> None:
     p = ClosingParameters()
     tested, alone, model = closing(), ResidualFilter(p), Previous(PredictorParameters())
     for x, r, c in timesteps(30):
-        r = np.zeros(2) if r is None else r
+        r = np.zeros(3) if r is None else r
         tested.observe(x, r, c)
-        alone.observe(x, r)
+        alone.observe(x[:2], r[:2])
         model.observe(alone.step)
-        assert (tested.forecast() == model.forecast() + alone.residual).all()
-
-
-# --- the mixture ----------------------------------------------------------------------------------------------------
-
-
-def test_the_mixture_weighs_by_discounted_squared_errors_with_an_initial_loss() -> None:
-    parameters = PredictorParameters()
-    p = parameters.formation
-    tested, models = Mixture(parameters), None
-    losses = np.array([[0.0, 0.0], [p.initial_loss, p.initial_loss]])
-    scale = np.array([p.scale_u_m, p.scale_v_m])
-    for x, _, _ in timesteps(25):
-        seen = x + 0.002
-        tested.judge(seen)
-        if models is not None:
-            losses = p.discount * losses + 0.5 * ((models - seen) / scale) ** 2
-        tested.observe(x)
-        k = tested.diagnostics().k
-        assert k is not None
-        koopman = 0.05 * (k[1:] @ [1.0, *(x / 0.05)])
-        models = np.stack([x, koopman])
-        weights = np.exp(-losses) / np.exp(-losses).sum(axis=0)
-        assert tested.forecast() == pytest.approx((weights * models).sum(axis=0), abs=1e-14)
-    shown = np.array2string(weights[1], precision=3, separator=", ")
-    notes = tested.diagnostics().notes
-    assert notes is not None
-    assert notes["weight of koopman"] == shown
-
-
-def test_persistence_is_believed_first() -> None:
-    tested = Mixture(PredictorParameters())
-    tested.observe(np.array([0.0, 0.05]))
-    notes = tested.diagnostics().notes
-    assert notes is not None
-    weight = float(notes["weight of koopman"].strip("[]").split(",")[0])
-    assert weight == pytest.approx(1.0 / (1.0 + np.e), abs=1e-3)
-
-
-def test_the_koopman_model_wins_where_displacements_follow_a_law() -> None:
-    """v alternates: persistence is always wrong, K = -1 about a constant is exact."""
-    tested = Mixture(PredictorParameters())
-    for n in range(60):
-        x = np.array([0.0, 0.05 + 0.01 * (-1) ** n])
-        tested.judge(x)
-        tested.observe(x)
-    assert tested.forecast()[1] == pytest.approx(0.06, abs=0.002)
+        assert (tested.forecast()[:2] == model.forecast() + alone.residual).all()

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from koopman_helpers import batch
-from predictor_helpers import HISTORY, forecasts, predictor, solve_2_by_2
+from predictor_helpers import HISTORY, forecasts, predictor, solve_2_by_2, whole
 from robot_formation.koopman.dictionaries import Dictionary
 from robot_formation.koopman.predictors import NAMES
 from robot_formation.koopman.predictors.dictionary_text import dictionary_from_text
@@ -84,9 +84,9 @@ def test_a_linear_law_is_forecast_exactly(name: str) -> None:
 def test_diagnostics_of_measured_show_the_last_innovation() -> None:
     found = predictor("measured")
     for x in HISTORY[:-1]:
-        found.observe(np.array(x))
+        found.observe(whole(x))
     k = found.diagnostics().k
-    found.observe(np.array(HISTORY[-1]))
+    found.observe(whole(HISTORY[-1]))
     assert found.diagnostics().innovation == pytest.approx(np.array(HISTORY[-1]) - k @ np.array(HISTORY[-2]))
 
 

@@ -46,7 +46,7 @@ def shown(values: dict[str, Any], count: int) -> Predictor:
 def diagnostics(found: Predictor) -> tuple[Any, ...]:
     seen = found.diagnostics()
     arrays = [None if part is None else part.tolist() for part in (seen.k, seen.innovation)]
-    return arrays, seen.condition_number, seen.notes
+    return arrays, seen.condition_number, seen.notes, seen.weights, seen.consistency, seen.qualities
 
 
 def test_json_and_back_goes_on_to_the_last_bit(values: dict[str, Any]) -> None:
@@ -155,7 +155,7 @@ def test_nothing_that_is_not_finite_gets_in(values: dict[str, Any]) -> None:
         (
             {"name": "formation"},
             {"name": "formation", "closing": ClosingParameters(noise_m=(0.1,), level_m=(0.1,), trend_m=(0.1,))},
-            "finite numbers of shape (1, 2, 3) are expected",
+            "packed numbers are expected",
         ),
     ],
 )
@@ -164,3 +164,10 @@ def test_a_state_of_another_predictor_is_refused(learned: dict[str, str], asked:
     with pytest.raises(FormationError) as refused:
         Predictor.from_state(PredictorParameters(**asked), state)
     assert said in str(refused.value)
+
+
+def test_a_state_of_the_version_without_turns_is_refused_and_the_line_says_so() -> None:
+    old = {"name": "previous", "model": {"last": [0.0, 0.05]}, "errors": [[1e-5, 0.0], [0.0, 1e-5]], "weight": 2.0}
+    with pytest.raises(PredictionError, match="earlier version, which knew no turns; remove the file") as refused:
+        Predictor.from_state(PredictorParameters(name="previous"), {**old, "expected": None, "observations": 1})
+    assert "\n" not in str(refused.value)
