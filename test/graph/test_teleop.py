@@ -1,4 +1,4 @@
-"""A leader driven over topics in the live graph, its replay, and a path with turns in graph and process."""
+"""A leader driven over topics in the live graph, its replay, and turns with a blackout in graph and process."""
 
 import threading
 from pathlib import Path
@@ -11,6 +11,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from graph_tools import displacements, formation, launch, short_scenario
+from robot_formation.analysis.from_bag import load_run
 from robot_formation.experiment.in_process import run_in_process
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("teleop")]
@@ -74,6 +75,7 @@ def test_what_a_person_has_driven_replays_to_the_last_bit(tmp_path: Path, monkey
         "fine_tuner.first_turn_rad=0.0",
         "predictor.closing.step_v_m=0.0",
         "predictor.closing.step_u_m=0.0",
+        "predictor.closing.step_turn_rad=0.0",
         f"start_x_m={driven.setup.start_x_m!r}",
         f"start_y_m={driven.setup.start_y_m!r}",
     )
@@ -82,9 +84,12 @@ def test_what_a_person_has_driven_replays_to_the_last_bit(tmp_path: Path, monkey
     assert formation("path", tmp_path / "again").stdout == file.read_text()
 
 
-def test_a_path_with_turns_is_the_same_in_the_graph_and_in_process(tmp_path: Path) -> None:
-    scenario = short_scenario(*CIRCLE)
+def test_a_path_with_turns_and_a_blackout_is_the_same_in_the_graph_and_in_process(tmp_path: Path) -> None:
+    scenario = short_scenario(*CIRCLE, "leader.timesteps=6", "blackouts=[[4, 2]]")
     assert launch(scenario, tmp_path / "graph").exit_code == 0
     assert run_in_process(scenario, tmp_path / "process", {}).exit_code == 0
     assert displacements(tmp_path / "graph") == displacements(tmp_path / "process")
-    assert len(displacements(tmp_path / "graph")) == 4
+    assert len(displacements(tmp_path / "graph")) == 6
+    graph, process = (load_run(tmp_path / name).followers[0] for name in ("graph", "process"))
+    assert (graph.states, repr(graph.residuals)) == (process.states, repr(process.residuals))
+    assert [residual.motion.finite for residual in graph.residuals] == [True, True, True, False, False, True]
