@@ -244,7 +244,7 @@ class Predictor:
             predictor._restore(state)
         except KeyError as error:
             raise PredictionError(f"the stored state of the predictor has no {error}") from None
-        except (TypeError, ValueError, OverflowError, KoopmanError) as error:
+        except (TypeError, ValueError, IndexError, OverflowError, KoopmanError) as error:
             raise PredictionError(f"the stored state of the predictor can't be used: {error}") from None
         return predictor
 

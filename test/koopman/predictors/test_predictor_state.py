@@ -81,11 +81,13 @@ def test_a_state_is_of_the_moment_when_it_was_taken(values: dict[str, Any]) -> N
 
 
 def paths(value: Any, path: Path = ()) -> Iterator[Path]:
-    """Every place in nested lists and mappings."""
+    """Every place in nested lists and mappings; of a list its ends, since what reads one item reads all."""
     yield path
-    items: Iterable[tuple[int | str, Any]] = (
-        value.items() if isinstance(value, dict) else enumerate(value if isinstance(value, list) else ())
-    )
+    items: Iterable[tuple[int | str, Any]] = ()
+    if isinstance(value, dict):
+        items = value.items()
+    elif isinstance(value, list) and value:
+        items = ((number, value[number]) for number in sorted({0, len(value) - 1}))
     for key, inner in items:
         yield from paths(inner, (*path, key))
 
