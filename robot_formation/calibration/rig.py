@@ -46,11 +46,16 @@ class CalibrationRig:
 
 @dataclass(frozen=True)
 class Observation:
-    """A drive as measured: the dot's way as seen from above [m], the turn [rad], the wheels' encoders [rad]."""
+    """A drive as measured: the dot's way (x, y) as seen from above [m], the turn [rad], the wheels' encoders [rad]."""
 
-    distance_m: float
+    way_m: tuple[float, float]
     turn_rad: float
     wheels_rad: tuple[float, ...]
+
+    @property
+    def distance_m(self) -> float:
+        """How far the dot went."""
+        return math.hypot(*self.way_m)
 
 
 class RobotOnRig:
@@ -119,7 +124,7 @@ class RobotOnRig:
         dot, heading = self._look()
         turn = math.remainder(heading - self._heading, math.tau)
         wheels = tuple(b - a for a, b in zip(before[: len(WHEELS)], self._joints[: len(WHEELS)], strict=True))
-        observation = Observation(math.dist(self._dot, dot), turn, wheels)
+        observation = Observation((dot[0] - self._dot[0], dot[1] - self._dot[1]), turn, wheels)
         self._dot, self._heading = dot, heading
         return observation
 

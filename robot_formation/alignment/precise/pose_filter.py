@@ -253,7 +253,7 @@ class PoseFilter:
         c, s = math.cos(state[YAW]), math.sin(state[YAW])
         along = np.array([[c, -s], [s, c]])
         # The neighbour slips as the follower does, and by as much more as it is tilted more.
-        tilt = float(relative_tilt(state[None])[0][0]) - (tilt_rad if model.slip_included else 0.0)
+        tilt = float(relative_tilt(state[None])[0][0]) - model.slip_included * tilt_rad
         aside = step.y_m - slip * tilt * (abs(step.x_m) + self._models.turning_way_m(step))
         jacobian = np.eye(SIZE)
         jacobian[:2, YAW] = along @ (-aside, step.x_m)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,12 @@ _LEAST_TURN_RAD = 0.02
 """A forecast turn below this counts as none: it is made of errors of the follower's own heading."""
 _TURNING_RAD, _SURE_ASIDE_M = 0.03, 0.008
 """Turn from which on the way aside of a step ahead is the forecast's, and the most that this may be unsure."""
+_LEG_LOSS_M, _SHORT_LEG_M = 0.002, 0.004
+"""How far a leg aside ends short, and the length from which on the loss falls as the length grows
+(bench/small_moves.py: legs of 3.5, 5, 8 and 20 mm reach 1.5, 3.2, 7.1 and 19.6 mm)."""
+_FORECAST_ASIDE = 0.5
+"""Share of the forecast in a turning step's way aside; the rest follows from the arc. A forecast alone would repeat
+what an error of the heading has taught it, the arc alone knows no slip."""
 _MOST_COST = 9.0
 """Bound on what a look charges a model more than the best one."""
 
@@ -99,11 +105,11 @@ class Drives:
 
 @dataclass(frozen=True)
 class StepModel:
-    """The neighbour's step in its own frame, covariance (3, 3) of (x, y, yaw), and whether slip is in it already."""
+    """The neighbour's step in its own frame, covariance (3, 3) of (x, y, yaw), and the share of slip that is in it."""
 
     step: Motion
     covariance: Matrix
-    slip_included: bool
+    slip_included: float
 
 
 class StepModels:
@@ -145,25 +151,28 @@ class StepModels:
         least = turned + _diagonal(p.length_sigma_m, aside_m, p.turn_sigma_rad)
         if first:
             unsure = _diagonal(0.0, _FIRST_ASIDE_SHARE * mean.x_m * mean.yaw_rad, 0.0)
-            return [StepModel(self._driven(mean, own), least + unsure, False)]
+            return [StepModel(self._driven(mean, own), least + unsure, 0.0)]
         arc = Motion(mean.x_m, mean.x_m * math.tan(0.5 * mean.yaw_rad), mean.yaw_rad)
         # In turns the way aside has many parts: the predictor has seen their sum, where it is sure of it.
         turning = abs(mean.yaw_rad) > _TURNING_RAD and step.matrix[1, 1] < _SURE_ASIDE_M**2
         floor = turned + _diagonal(p.length_sigma_m, max(aside_m, p.forecast_aside_sigma_m), p.turn_sigma_rad)
-        ahead = mean if turning else self._driven(arc, own)
+        ahead = self._driven(arc, own)
+        share = _FORECAST_ASIDE if turning else 0.0
+        ahead = replace(ahead, y_m=ahead.y_m + share * (mean.y_m - ahead.y_m))
         bend = np.array([0.0, 0.5 * mean.x_m, 1.0]) * p.bend_sigma_rad
         return [
-            StepModel(ahead, least, turning),
-            *(StepModel(mean, floor + _scaled(step.matrix, scale), True) for scale in p.scales),
-            StepModel(mean, step.matrix + _diagonal(p.change_sigma_m, p.change_sigma_m, p.change_sigma_rad), True),
-            StepModel(ahead, least + np.outer(bend, bend), turning),
+            StepModel(ahead, least, share),
+            *(StepModel(mean, floor + _scaled(step.matrix, scale), 1.0) for scale in p.scales),
+            StepModel(mean, step.matrix + _diagonal(p.change_sigma_m, p.change_sigma_m, p.change_sigma_rad), 1.0),
+            StepModel(ahead, least + np.outer(bend, bend), share),
         ]
 
     def _driven(self, step: Motion, own: Drives) -> Motion:
-        """Return what a drive makes of a step: it slips aside, and short legs aside are not driven."""
+        """Return what a drive makes of a step: it slips aside, and legs aside end short or are not driven at all."""
         turn, forward, left = step.legs
-        if abs(left) < self._least_leg_m:
-            step = Motion.from_legs(turn, forward, 0.0)
+        loss_m = _LEG_LOSS_M * min(1.0, _SHORT_LEG_M / max(abs(left), _LEG_LOSS_M))
+        driven_m = abs(left) - loss_m if abs(left) >= self._least_leg_m else 0.0
+        step = Motion.from_legs(turn, forward, math.copysign(max(driven_m, 0.0), left))
         way_m = step.x_m + math.copysign(self.turning_way_m(step), step.x_m)
         return Motion(step.x_m, step.y_m + own.slip * way_m, step.yaw_rad)
 

@@ -10,7 +10,7 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.geometry.uncertain_motion import UncertainMotion
 
 PARAMETERS = StepParameters()
-LEAST_LEG_M = 0.003
+LEAST_LEG_M = 0.0022
 FORECAST = np.diag([0.004**2, 0.002**2, 0.01**2])
 OWN = Drives(slip=0.02, overshoot=0.0, count=20)
 
@@ -39,8 +39,29 @@ def test_a_step_ahead_slips_aside_like_the_followers_own_drive() -> None:
 
 def test_a_forecast_leg_aside_that_no_drive_makes_is_left_out_of_the_step_ahead_only() -> None:
     ahead, *by_forecast = models(Motion(0.05, 0.002), own=Drives(count=5))
-    assert ahead.step.y_m == 0.0
+    assert ahead.step.y_m == pytest.approx(0.0, abs=1e-12)
     assert all(model.step.y_m == 0.002 for model in by_forecast[: len(PARAMETERS.scales)])
+
+
+@pytest.mark.parametrize(
+    ("leg_m", "reached_m"), [(0.002, 0.0), (0.0035, 0.0015), (0.005, 0.0034), (0.008, 0.007), (0.02, 0.0196)]
+)
+def test_legs_aside_end_short_as_measured(leg_m: float, reached_m: float) -> None:
+    for sign in (1.0, -1.0):
+        (only,) = models(Motion(0.05, sign * leg_m), first=True, own=Drives())
+        assert only.step.y_m == pytest.approx(sign * reached_m, abs=1e-4)
+
+
+def test_on_an_arc_the_way_aside_is_half_the_forecasts_and_half_the_arcs() -> None:
+    turn = 0.14
+    forecast = Motion(0.05, 0.001, turn)
+    ahead, *_ = models(forecast, own=Drives(count=5))
+    leg_m = 0.05 * math.sin(turn) - 0.05 * math.tan(0.5 * turn) * math.cos(turn)  # to the other side than the arc
+    lost_m = 0.002
+    arc_m = 0.05 * math.tan(0.5 * turn) + lost_m * math.cos(turn)
+    assert leg_m == pytest.approx(0.0035, abs=1e-4)
+    assert ahead.step.y_m == pytest.approx(0.5 * (0.001 + arc_m), abs=2e-5)
+    assert ahead.slip_included == 0.5
 
 
 def test_the_models_by_forecast_are_as_certain_as_the_forecast_times_their_scale() -> None:
