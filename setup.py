@@ -72,6 +72,7 @@ setup(
             "odmd",
             "pykoop",
             "pytest>=7.4.4",
+            "pytest-rerunfailures",
             "pytest-xdist",
             "ruff",
             "scipy-stubs",

@@ -264,7 +264,7 @@ def carry_out(args: argparse.Namespace) -> int:
         for path, surface, predictor in itertools.product(args.paths, args.surfaces, args.predictors)
     ]
     tasks = [task for task in chosen if task not in done]
-    for task in chosen:
+    for task in {(task.path, task.surface, task.seed): task for task in tasks}.values():
         build(task, args.set).check()
     rows = run_parallel(run_task, ((task, args.set) for task in tasks), args.jobs)
     for row in with_progress(rows, len(tasks)):

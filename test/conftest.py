@@ -27,6 +27,19 @@ for variable in PROFILES:
     os.environ.setdefault(variable, str(config_dir() / "loopback.xml"))
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option with which continuous integration runs."""
+    parser.addoption("--retry-graph", action="store_true", help="try tests of the node graph that fail once more")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the tests of the node graph for pytest-rerunfailures, whose reruns the summary lists (-rR)."""
+    if config.getoption("--retry-graph"):
+        for item in items:
+            if item.get_closest_marker("graph"):
+                item.add_marker(pytest.mark.flaky(reruns=1))
+
+
 @pytest.fixture
 def lab(tmp_path: Path) -> Iterator[Lab]:
     """A ROS domain of the test's own."""

@@ -1,0 +1,191 @@
+"""Driving blind: how far the follower strays in blackouts of 1, 2, 3 and 5 timesteps, per path and predictor.
+
+Each run has one of each length, some timesteps with the camera between them; that of three begins with timestep 30.
+Paths, surface and predictors are those of `leader_paths.py`; the fine-tuner is in mode precise. The table OUT/runs.csv
+grows row by row, and the same command goes on where it was stopped. `report` prints medians over seeds: the formation
+error at the end of each blackout, by how much the formation-error vector grew over that of three timesteps, and how
+often the leader was found again after it.
+
+    python bench/blackouts.py run OUT --seeds 0:10 [--paths circle12,slalom8] [--predictors previous+close,formation]
+    python bench/blackouts.py report OUT
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from leader_paths import EDMD, PATHS, SURFACES, Task, middle, print_table
+from robot_formation.analysis.quantities import FollowerAnalysis, analyse
+from robot_formation.batch.pool import run_parallel
+from robot_formation.batch.progress_line import with_progress
+from robot_formation.batch.resumable_table import ResumableTable
+from robot_formation.cli.sweep import seeds
+from robot_formation.errors import FormationError
+from robot_formation.experiment import scenario as scenarios
+from robot_formation.experiment.in_memory_record import run_in_memory
+
+BLACKOUTS = {1: 18, 2: 23, 3: 30, 5: 38}
+"""First blind timestep by length."""
+TIMESTEPS = 46
+SEEN_AGAIN = 3
+"""Timesteps with the camera within which the leader has to be in its place again."""
+IN_PLACE_M = 0.05
+"""Formation error up to which the follower counts as in its place again."""
+PREDICTORS = ("previous+close", "trend+close", "edmd+close", "formation")
+PATHS_HERE = tuple(name for name in PATHS if name not in ("straight", "stadium", "clothoid", "random_walk", "switch"))
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a run yields; errors at the end of each blackout [m], None where the run ended before."""
+
+    path: str
+    surface: str
+    predictor: str
+    seed: int
+    outcome: str
+    timesteps: int
+    error_1_m: float | None
+    error_2_m: float | None
+    error_3_m: float | None
+    error_5_m: float | None
+    growth_3_m: float | None
+    found_again_3: int | None
+
+    @property
+    def task(self) -> Task:
+        """The run that it is of."""
+        return Task(self.path, self.surface, self.predictor, self.seed)
+
+
+def build(task: Task, settings: Sequence[str]) -> scenarios.Scenario:
+    """Make a run's scenario.
+
+    Raises:
+        FormationError: on a misspelt or wrong setting KEY=VALUE.
+    """
+    name, *parameters = PATHS[task.path]
+    blackouts = ", ".join(f"[{first}, {length}]" for length, first in BLACKOUTS.items())
+    return scenarios.override(
+        scenarios.with_surface(scenarios.load_track("one"), task.surface),
+        [
+            "world.camera.mode=on_demand",
+            "world.overhead.enabled=false",
+            f"world.surface_parameters=[{', '.join(SURFACES[task.surface])}]",
+            f"leader.timesteps={TIMESTEPS}",
+            f"leader.path={name}",
+            f"leader.path_parameters=[{', '.join(parameters)}]",
+            f"blackouts=[{blackouts}]",
+            f"predictor.name={task.predictor}",
+            *(EDMD if task.predictor.startswith("edmd") else ()),
+            f"seed={task.seed}",
+            *settings,
+        ],
+    )
+
+
+def run_task(task: Task, settings: Sequence[str]) -> Row:
+    """Carry out one run."""
+    analysis = analyse(run_in_memory(build(task, settings)))
+    follower = analysis.followers[0]
+    ends = {length: error(follower, first + length - 1) for length, first in BLACKOUTS.items()}
+    before, after = error(follower, BLACKOUTS[3] - 1), ends[3]
+    again = [error(follower, BLACKOUTS[3] + 3 + k) for k in range(SEEN_AGAIN)]
+    reached = [float(np.hypot(*found)) < IN_PLACE_M for found in again if found is not None]
+    lengths = {length: None if end is None else float(np.hypot(*end)) for length, end in ends.items()}
+    return Row(
+        *task,
+        outcome=analysis.outcome,
+        timesteps=follower.totals["timesteps_finished"],
+        error_1_m=lengths[1],
+        error_2_m=lengths[2],
+        error_3_m=lengths[3],
+        error_5_m=lengths[5],
+        growth_3_m=None if before is None or after is None else float(np.hypot(*np.subtract(after, before))),
+        found_again_3=None if after is None else int(any(reached)),
+    )
+
+
+def error(follower: FollowerAnalysis, timestep: int) -> tuple[float, float] | None:
+    """Return the formation error (u, v) [m] at the end of a timestep; None if the run ended before."""
+    found = [t.error_uv_m for t in follower.timesteps if t.t == timestep]
+    return found[0] if found else None
+
+
+def open_table(folder: Path) -> ResumableTable[Row]:
+    """Return the table of a folder."""
+    return ResumableTable(folder / "runs.csv", Row, FormationError, "no table of this bench; choose another OUT")
+
+
+def carry_out(args: argparse.Namespace) -> int:
+    """Run what is missing in the table."""
+    args.out.mkdir(parents=True, exist_ok=True)
+    table = open_table(args.out)
+    done = {row.task for row in table.read()} if table.path.exists() else set()
+    if not done:
+        table.rewrite(())
+    chosen = [
+        Task(path, args.surface, predictor, seed)
+        for seed in seeds(args.seeds)
+        for path in args.paths
+        for predictor in args.predictors
+    ]
+    tasks = [task for task in chosen if task not in done]
+    for task in {(task.path, task.seed): task for task in tasks}.values():
+        build(task, args.set).check()
+    rows = run_parallel(run_task, ((task, args.set) for task in tasks), args.jobs)
+    for row in with_progress(rows, len(tasks)):
+        table.append([row])
+    return 0
+
+
+def report(args: argparse.Namespace) -> int:
+    """Print medians over the seeds, one line per path and predictor."""
+    groups: dict[tuple[str, str, str], list[Row]] = {}
+    for row in open_table(args.out).read():
+        groups.setdefault((row.path, row.surface, row.predictor), []).append(row)
+    print("Formation error [cm] at the end of blackouts of 1, 2, 3 and 5 timesteps; growth of its vector over three;")
+    print("runs in which the leader was seen again after three")
+    lines = []
+    for group, rows in groups.items():
+        columns = [[getattr(row, f"error_{length}_m") for row in rows] for length in BLACKOUTS]
+        found = [row.found_again_3 for row in rows if row.found_again_3 is not None]
+        errors = [middle([value for value in column if value is not None], 100.0) for column in columns]
+        growth = middle([row.growth_3_m for row in rows if row.growth_3_m is not None], 100.0)
+        lines.append([*group, str(len(rows)), *errors, growth, f"{sum(found)} of {len(found)}"])
+    head = ["path", "surface", "predictor", "seeds", *(str(length) for length in BLACKOUTS), "growth", "found again"]
+    print_table(head, lines)
+    return 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    for name, function in (("run", carry_out), ("report", report)):
+        verb = verbs.add_parser(name, help=function.__doc__)
+        verb.add_argument("out", type=Path, help="folder of the table")
+        verb.set_defaults(function=function)
+        if name == "run":
+            verb.add_argument("--seeds", default="0:10")
+            verb.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+            verb.add_argument("--surface", default="bowl", choices=list(SURFACES))
+            verb.add_argument("--paths", type=lambda text: text.split(","), default=list(PATHS_HERE))
+            verb.add_argument("--predictors", type=lambda text: text.split(","), default=list(PREDICTORS))
+            verb.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    args = parser.parse_args()
+    try:
+        return int(args.function(args))
+    except FormationError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
