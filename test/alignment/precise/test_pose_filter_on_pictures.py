@@ -16,6 +16,8 @@ from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
+from robot_formation.vision.marker import Face
+from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.world.camera import Camera
 from robot_formation.world.pose import Pose, pose_on_surface
@@ -49,12 +51,19 @@ class Pair:
         before, self.follower = self.follower, self.on_ground(NEIGHBOUR.then(place))
         if self.filter.known:
             self.filter.moved(self.follower.planar.relative_to(before.planar))
+        self.filter.look(mean_boxes(self._frames()[-AVERAGED:]))
+        self.looks += 1
+
+    def _frames(self) -> list[list[Block]]:
         sensor = Sensor(WORLD.camera, self.looks, "follower_1")
         development = sensor.develop(self.camera.light(self.follower, [self.neighbour]))
         detector = BlockDetector(DETECTOR.load(), DETECTOR)
-        frames = [detector.process(sensor.expose(development, 0.0), n * FRAME_US) for n in range(FRAMES)]
-        self.filter.look(mean_boxes(frames[-AVERAGED:]))
-        self.looks += 1
+        return [detector.process(sensor.expose(development, 0.0), n * FRAME_US) for n in range(FRAMES)]
+
+    def faces(self, yaw_rad: float) -> set[Face]:
+        """The faces that a look shows of a neighbour straight beside the follower, and turned in its frame."""
+        self.follower = self.on_ground(NEIGHBOUR.then(Motion(0.0, 0.32, yaw_rad).inverse()))
+        return set(mean_boxes(self._frames()[-AVERAGED:]))
 
     def errors(self) -> tuple[float, float, float]:
         """Estimate minus truth: distance between the origins [m], bearing [rad], heading [rad]."""
@@ -62,6 +71,15 @@ class Pair:
         distance_m = math.dist(self.neighbour.position, self.follower.position)
         bearing_rad = math.atan2(found.x_m, found.y_m) - math.atan2(true.x_m, true.y_m)
         return math.hypot(found.x_m, found.y_m) - distance_m, bearing_rad, found.yaw_rad - true.yaw_rad
+
+
+@pytest.mark.parametrize("surface", ["plane", "bowl"])
+def test_a_heading_of_less_than_10_degrees_shows_no_second_face(surface: str) -> None:
+    pair = Pair(surface)
+    for degrees in (-9, -5, 0, 5, 9):
+        assert pair.faces(math.radians(degrees)) == {Face.TARGET}, degrees
+    assert pair.faces(math.radians(30)) == {Face.TARGET, Face.REAR}
+    assert pair.faces(math.radians(-30)) == {Face.TARGET, Face.FRONT}
 
 
 @pytest.mark.parametrize("surface", ["plane", "bowl"])
