@@ -1,10 +1,10 @@
 """Driving blind: how far the follower strays in blackouts of 1, 2, 3 and 5 timesteps, per path and predictor.
 
 Each run has one of each length, some timesteps with the camera between them; that of three begins with timestep 30.
-Paths, surface and predictors are those of `leader_paths.py`; the fine-tuner is in mode precise. The table OUT/runs.csv
+Paths, surfaces and predictors are among those of `leader_paths.py`; the fine-tuner is in mode precise. OUT/runs.csv
 grows row by row, and the same command goes on where it was stopped. `report` prints medians over seeds: the formation
 error at the end of each blackout, by how much the formation-error vector grew over that of three timesteps, and how
-often the leader was found again after it.
+often the follower was in its place again after it. A lost run counts as infinitely far.
 
     python bench/blackouts.py run OUT --seeds 0:10 [--paths circle12,slalom8] [--predictors previous+close,formation]
     python bench/blackouts.py report OUT
@@ -13,6 +13,7 @@ often the leader was found again after it.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Sequence
@@ -21,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from leader_paths import EDMD, PATHS, SURFACES, Task, middle, print_table
+from leader_paths import EDMD, PATHS, SURFACES, Task, print_table
 from robot_formation.analysis.quantities import FollowerAnalysis, analyse
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
@@ -152,17 +153,31 @@ def report(args: argparse.Namespace) -> int:
     for row in open_table(args.out).read():
         groups.setdefault((row.path, row.surface, row.predictor), []).append(row)
     print("Formation error [cm] at the end of blackouts of 1, 2, 3 and 5 timesteps; growth of its vector over three;")
-    print("runs in which the leader was seen again after three")
+    print("runs in which the follower was in its place again within three timesteps after these")
     lines = []
     for group, rows in groups.items():
-        columns = [[getattr(row, f"error_{length}_m") for row in rows] for length in BLACKOUTS]
-        found = [row.found_again_3 for row in rows if row.found_again_3 is not None]
-        errors = [middle([value for value in column if value is not None], 100.0) for column in columns]
-        growth = middle([row.growth_3_m for row in rows if row.growth_3_m is not None], 100.0)
-        lines.append([*group, str(len(rows)), *errors, growth, f"{sum(found)} of {len(found)}"])
-    head = ["path", "surface", "predictor", "seeds", *(str(length) for length in BLACKOUTS), "growth", "found again"]
+        errors = [median_cm([getattr(row, f"error_{length}_m") for row in rows]) for length in BLACKOUTS]
+        growth = median_cm([row.growth_3_m for row in rows])
+        found = f"{sum(row.found_again_3 or 0 for row in rows)} of {len(rows)}"
+        lost = sum(row.outcome != "done" for row in rows)
+        lines.append([*group, str(len(rows)), str(lost), *errors, growth, found])
+    head = [
+        "path",
+        "surface",
+        "predictor",
+        "seeds",
+        "lost",
+        *(str(length) for length in BLACKOUTS),
+        "growth",
+        "in place",
+    ]
     print_table(head, lines)
     return 0
+
+
+def median_cm(values: Sequence[float | None]) -> str:
+    """Median in centimetres; a missing value, of a run that was lost before, is infinite."""
+    return f"{100.0 * float(np.median([math.inf if value is None else value for value in values])):.1f}"
 
 
 def main() -> int:

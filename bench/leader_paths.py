@@ -299,6 +299,8 @@ def ratios(own: Mapping[int, Row], other: Mapping[int, Row]) -> list[float]:
     found = []
     for seed in own.keys() & other.keys():
         a, b = rank(own[seed]), rank(other[seed])
+        if math.isinf(a) and math.isinf(b):
+            continue  # nothing to compare
         found.append(math.inf if math.isinf(a) else a / b if b > 0.0 else 1.0 if a == 0.0 else math.inf)
     return found
 
@@ -404,6 +406,7 @@ def figure(args: argparse.Namespace) -> int:
                 if found:
                     places.append(row + 0.14 * (number_ - (len(MARKS) - 1) / 2))
                     values.append([100.0 * rank(r) / (TIMESTEPS - COLLECTION_TIMESTEPS) for r in found.values()])
+            values = [[value for value in v if math.isfinite(value)] or [math.nan] for v in values]  # without lost runs
             medians = [float(np.median(v)) for v in values]
             spread = np.array([np.abs(np.quantile(v, (0.25, 0.75)) - np.median(v)) for v in values])
             colour, marker = MARKS[name]

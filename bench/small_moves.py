@@ -21,6 +21,7 @@ from robot_formation.geometry.se2 import Motion
 STEP_M, TURN_RAD = 0.05, math.radians(8.0)
 MOVES = {
     "ahead 50 mm": Motion(STEP_M),
+    "back 50 mm": Motion(-STEP_M),
     **{f"left {1e3 * way:.1f} mm": Motion(0.0, way) for way in (0.0025, 0.0035, 0.005, 0.008, 0.02)},
     **{f"right {1e3 * way:.1f} mm": Motion(0.0, -way) for way in (0.0035, 0.005)},
     "turn by 5 deg": Motion(yaw_rad=math.radians(5.0)),

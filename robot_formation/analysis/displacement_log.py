@@ -83,7 +83,12 @@ class DisplacementLog:
         The ideal move (displacement plus residual), NaN where the residual is unknown; the displacement itself if the
         log has no residuals.
         """
-        return self.displacements_m + self.residuals_m if self.has_residuals else self.displacements_m
+        if not self.has_residuals:
+            return self.displacements_m
+        # A residual is expressed in the frame in which the displacement ends.
+        u, v = self.residuals_m.T
+        cosines, sines = np.cos(self.turns_rad), np.sin(self.turns_rad)
+        return np.asarray(self.displacements_m + np.column_stack([cosines * u - sines * v, sines * u + cosines * v]))
 
 
 def read_log(

@@ -67,6 +67,7 @@ def forecast_log(log: DisplacementLog, parameters: PredictorParameters, horizon:
     predictor = Predictor(parameters)
     means, covariances = np.full((len(log), 2), np.nan), np.full((len(log), 2, 2), np.nan)
     ahead: list[list[Ahead]] = []
+    turned = bool(log.turns_rad.any())
     for t, place in enumerate(log.places):
         if t > 0:
             forecast = predictor.predict()
@@ -75,13 +76,13 @@ def forecast_log(log: DisplacementLog, parameters: PredictorParameters, horizon:
                 ahead.append(predictor.ahead(horizon))
         try:
             displacement = np.append(log.displacements_m[t], log.turns_rad[t])
-            turned = bool(log.turns_rad.any())
             predictor.observe(
                 displacement, _known(log.residuals_m[t], turned), _known(log.commanded_m[t], False, log.turns_rad[t])
             )
         except PredictionError as error:
             raise AnalysisError(
-                f"{log.source}, {place}: {error}; correct it (metres), or raise predictor.max_u_m and max_v_m"
+                f"{log.source}, {place}: {error}; correct it, or raise the bound (read as metres, unless --unit says "
+                "otherwise, and radians)"
             ) from error
     statistics = error_statistics(log.targets_m - means, covariances)
     horizons = tuple({"h": h, **_way_statistics(log, ahead, h)} for h in range(1, horizon + 1))

@@ -77,9 +77,15 @@ def collect() -> dict[str, dict[str, str]]:
 
 
 def _parameters(kind: type) -> str:
-    """List a path's parameters with their defaults; those that follow from elsewhere with the place."""
+    """List a path's parameters with their defaults; those that follow from elsewhere with the place.
+
+    Where zero stands for a value that follows from other parameters, only the name is listed.
+    """
     elsewhere = {"step_m": "leader.step_m", "phase": "by seed"}
-    found = [f"{name}={elsewhere.get(name, spec.default)}" for name, spec in specs(kind).items()]
+    found = [
+        name if spec.default == 0.0 and "0: " in spec.description else f"{name}={elsewhere.get(name, spec.default)}"
+        for name, spec in specs(kind).items()
+    ]
     return f"[{', '.join(found)}]" if found else ""
 
 

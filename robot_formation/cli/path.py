@@ -21,6 +21,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("path", help="the way a recorded leader was driven, as CSV", description=DESCRIPTION)
     parser.add_argument("bag", metavar="BAG", type=Path, help="bag of a run: a folder, an .mcap or a .db3 file")
     parser.add_argument("--out", metavar="FILE", type=Path, help="a new file, instead of standard output")
+    parser.add_argument("--namespace", help="of the formation, where the bag holds several; '/' for the root")
     parser.set_defaults(run=run)
 
 
@@ -32,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     """
     from robot_formation.analysis.leader_moves import load_leader_moves, waypoint_text
 
-    moves = load_leader_moves(args.bag)
+    moves = load_leader_moves(args.bag, args.namespace)
     text = waypoint_text(moves)
     if args.out is None:
         sys.stdout.write(text)

@@ -154,6 +154,10 @@ def _announce(plan: Plan) -> None:
     if len(plan.seeds) < FEW_SEEDS:
         text = f"warning: intervals say nothing with fewer than {FEW_SEEDS} seeds; 20 are --seeds 0:20"
         print(text, file=sys.stderr)
+    turning = [path for path in plan.paths if plan.turns_unfollowed(path)]
+    if turning:
+        text = f"warning: {', '.join(turning)} turns, which mode paper can't follow: --set fine_tuner.mode=precise"
+        print(text, file=sys.stderr)
 
 
 def seeds_text(chosen: Sequence[int]) -> str:

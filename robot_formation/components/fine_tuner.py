@@ -66,8 +66,8 @@ class FineTunerComponent(Component):
     def _on_answer(self, topic: names.Topic, message: Message) -> None:
         """Take the predictor's answer once both of its messages are here, in whatever order they came.
 
-        `forecast` is waited for only after it has been heard of in an earlier timestep: whoever sends none is
-        understood too, and what is heard doesn't depend on the order in which topics arrive.
+        `forecast` is waited for only after it has been heard of in an earlier timestep: a predictor that sends
+        none works too, and what is heard doesn't depend on the order in which topics arrive.
         """
         stamp_ns = conversions.stamp_of(message)
         if topic == names.FORECAST and self._first_forecast_ns is None:

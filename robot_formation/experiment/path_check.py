@@ -116,7 +116,10 @@ class PathCheck:
             ("in a turn", turn, self.drive.max_turn_rad, "rad"),
         ):
             if abs(amount) > most + _TOLERANCE:
-                return f"would move {abs(amount):.3f} {unit} {what}, beyond the drive's range of {most:g} {unit},"
+                digits = 3 if round(abs(amount), 3) > most else 4
+                return (
+                    f"would move {abs(amount):.{digits}f} {unit} {what}, beyond the drive's range of {most:g} {unit},"
+                )
         return ""
 
     def _least_gap_m(self, own: Motion, neighbour: Motion) -> float:

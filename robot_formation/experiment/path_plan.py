@@ -91,7 +91,10 @@ def path_start(
     except ParameterError:
         return None
     whole = formation(world, followers, distance_m)
-    return centred_start(swept_by(path, leader.timesteps, whole, math.radians(heading_deg)), plate_m)
+    found = centred_start(swept_by(path, leader.timesteps, whole, math.radians(heading_deg)), plate_m)
+    # A path that is too large starts somewhere on the plate: `Scenario.check` then tells what is too large.
+    x_m, y_m = (min(max(value, 0.0), plate_m) for value in found)
+    return (x_m, y_m)
 
 
 def swept_by(path: LeaderPath, timesteps: int, whole: Formation, heading_rad: float) -> Track:

@@ -31,6 +31,7 @@ from robot_formation.experiment.path_plan import (
     with_room,
 )
 from robot_formation.follower.blind_driving import blind_timesteps
+from robot_formation.follower.fine_tuning import AlignmentModeName
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.parameters import (
@@ -182,6 +183,14 @@ class Scenario:
             self.check_path()
 
     @property
+    def turns_unfollowed(self) -> bool:
+        """Whether the leader's path turns, but the followers align by a mode that knows no heading."""
+        if self.fine_tuner.mode is not AlignmentModeName.PAPER:
+            return False
+        path = self.leader.make_path()
+        return any(path.motion(timestep).yaw_rad for timestep in range(1, self.leader.timesteps + 1))
+
+    @property
     def plate_m(self) -> float:
         """Edge of the square plate."""
         return plate_size(self.world.surface, self.world.surface_parameters)
@@ -192,7 +201,7 @@ class Scenario:
         Raises:
             ParameterError: naming the robot, the timestep and what would fit.
         """
-        chosen = not any(entry in self.given for entry in START)
+        chosen = self.leader.path != STRAIGHT and not any(entry in self.given for entry in START)
         distance_m = self.fine_tuner.formation_distance_m
         PathCheck(leader or self.leader, self.world, self.drive, distance_m, self.setup.followers, chosen).require()
 

@@ -93,6 +93,11 @@ class Plan:
     settings: tuple[str, ...] = ()
     paths: tuple[str, ...] = (STRAIGHT,)
 
+    def turns_unfollowed(self, path: str) -> bool:
+        """Whether a path turns, but the followers align by a mode that knows no heading."""
+        task = Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0], path)
+        return build(task, self.settings).turns_unfollowed
+
     def check(self) -> None:
         """Check every name and setting before anything is run.
 

@@ -38,8 +38,11 @@ class UncertainMotion:
 
     @property
     def matrix(self) -> Matrix:
-        """The covariance (3, 3) of (x, y, yaw)."""
-        return np.reshape(self.covariance, (3, 3))
+        """The covariance (3, 3) of (x, y, yaw); a turn that isn't known is taken for exact."""
+        found = np.array(self.covariance).reshape(3, 3)
+        if not self.turn_known:
+            found[2, 2] = 0.0
+        return found
 
     @property
     def turn_known(self) -> bool:

@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 from robot_formation.koopman.linear_algebra import KoopmanError, Matrix, as_matrix, as_vector
 from robot_formation.koopman.spectrum import spectrum
 
-# An eigenvalue is called spurious where its squared residual is beyond this many times what noise alone leaves.
-_BEYOND_NOISE = 2.0
+# An eigenvalue is called spurious where its squared residual is beyond this many times what noise alone leaves, or
+# where its residual is so large: eigenvalues made of nothing but noise have one near 1.
+_BEYOND_NOISE, _LARGE_RESIDUAL = 2.0, 0.7
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,10 @@ class EigenvalueQuality:
         eigenvalue: lambda.
         period: 2 pi / |arg(lambda)| timesteps; None if it is real and positive, which is no oscillation.
         residual: sqrt(mean |phi(y) - lambda phi(x)|^2 / mean |phi(x)|^2), phi its eigenfunction, over the pairs.
-        noise: what measurement noise alone leaves of such a residual.
-        spurious: whether the residual's square is more than twice the noise's: no eigenvalue of the system's.
+        noise: what measurement noise alone leaves of such a residual if the observables' noises are independent of each
+            other. Delays share displacements; with them it is an upper estimate.
+        spurious: whether the residual is above 0.7, so that the eigenfunction's next value hardly follows from the
+            last, or its square more than twice the noise's: no eigenvalue of the system's, or none that the data show.
     """
 
     eigenvalue: complex
@@ -49,7 +52,7 @@ def consistency_index(psi_x: ArrayLike, psi_y: ArrayLike) -> float | None:
         psi_y: (k, m) observables of their successors.
 
     Returns:
-        The index, from 0 to 1; None with fewer pairs than observables, which any K fits.
+        The index, from 0 to 1; None unless there are more pairs than observables: any K fits fewer.
 
     Raises:
         KoopmanError: if the pairs don't fit each other, or are not finite.
@@ -75,7 +78,7 @@ def eigenvalue_qualities(
         noise: (k,) standard deviation of each observable's measurement noise.
 
     Returns:
-        None with fewer pairs than observables: residuals in the sample say nothing then.
+        None unless there are more pairs than observables: residuals in the sample say nothing then.
 
     Raises:
         KoopmanError: if K and the pairs don't fit each other, or are not finite.
@@ -99,7 +102,7 @@ def eigenvalue_qualities(
                 period=2.0 * np.pi / angle if angle > 1e-9 else None,
                 residual=min(squared, 1e300) ** 0.5,
                 noise=min(of_noise, 1e300) ** 0.5,
-                spurious=squared > _BEYOND_NOISE * of_noise,
+                spurious=squared > _BEYOND_NOISE * of_noise or squared > _LARGE_RESIDUAL**2,
             )
         )
     return qualities

@@ -47,7 +47,7 @@ class DrivenSteps:
     def motion(self, now_s: float) -> Motion | None:
         """Return the motion of a timestep that begins now; None while nobody drives.
 
-        Nobody does when the newest velocity is zero or older than the dead man's time.
+        Not when the newest velocity is zero or older than the dead man's time.
         """
         if now_s - self._heard_s > self._p.timeout_s:
             return None

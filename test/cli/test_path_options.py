@@ -37,6 +37,10 @@ def test_the_list_of_paths_has_their_parameters_with_defaults(capsys: pytest.Cap
             "seed 1: path 'pulse': leader would leave the plate",
         ),
         (["path", "nowhere"], "nowhere"),
+        (["path", "nowhere", "--namespace", "/a"], "nowhere"),
+        (["run", "--path", "slalom", "--set", "leader.timesteps=1000"], "leader would leave the plate"),
+        (["run", "--path", "circle", "--set", "leader.path_parameters=[heading=along]"], "period="),
+        (["run", "--track", "one", "--set", "leader.timesteps=34", "--set", "heading_deg=270"], "leave the plate"),
     ],
 )
 def test_what_cannot_be_driven_is_one_line_and_exit_code_2(
@@ -68,3 +72,21 @@ def test_the_way_of_a_recorded_leader_is_read_back_to_the_last_bit(
     capsys.readouterr()
     assert main(["path", str(tmp_path / "bag"), "--out", str(tmp_path / "way.csv")]) == 2
     assert "choose another --out" in capsys.readouterr().err
+
+
+def test_a_file_in_millimetres_is_said_to_leave_the_plate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mm.csv"
+    file.write_text("x_m,y_m\n" + "".join(f"{50 * k},0\n" for k in range(21)))
+    way = ["--set", f"leader.path_parameters=[file={file}]", "--bag", str(tmp_path / "bag")]
+    assert main(["run", "--path", "waypoints", *way]) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "leader would move 50.000 m along v, beyond the drive's range" in said
+
+
+def test_a_sweep_of_a_path_that_turns_warns_that_mode_paper_cannot_follow(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    choice = ["--tracks", "two", "--predictors", "previous", "--seeds", "0:1", "--set", "leader.timesteps=1"]
+    for number, (path, warned) in enumerate({"arc": True, "circle": False}.items()):
+        assert main(["sweep", *choice, "--paths", path, "--out", str(tmp_path / str(number))]) == 0
+        assert ("arc turns, which mode paper can't follow" in capsys.readouterr().err) is warned

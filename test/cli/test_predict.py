@@ -367,3 +367,19 @@ def test_wrong_options_for_logs_of_ones_own_are_refused_in_a_line(
     capsys: pytest.CaptureFixture[str], foreign: Path, options: tuple[str, ...], said: str
 ) -> None:
     assert said in complaint(capsys, foreign, *options)
+
+
+def test_with_turns_the_table_judges_the_same_moves_as_the_row_of_horizon_1(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    random = np.random.default_rng(3)
+    file = tmp_path / "turning.csv"
+    rows = np.column_stack(
+        [0.002 * random.standard_normal(30), 0.05 + 0.002 * random.standard_normal(30), np.full(30, 0.3)]
+        + [0.01 * random.standard_normal(30) for _ in range(2)]
+    )
+    header = "u_m,v_m,turn_rad,residual_u_m,residual_v_m"
+    np.savetxt(file, rows, delimiter=",", header=header, comments="")
+    found = forecasts(capsys, file, "--horizon", "1", "--predictors", "previous,formation")
+    for values in found.values():
+        assert values["horizon"][0]["rmse"] == pytest.approx(values["error_m"]["rmse"])

@@ -21,7 +21,7 @@ from robot_formation.follower.fine_tuning import (
     SendMove,
 )
 from robot_formation.geometry.se2 import Motion
-from robot_formation.geometry.uncertain_motion import UncertainMotion
+from robot_formation.geometry.uncertain_motion import TURN_UNKNOWN, UncertainMotion
 from robot_formation.parameters import ParameterError, from_mapping
 
 IN_PLACE = blocks_of(state_of())
@@ -158,3 +158,10 @@ def test_a_turn_that_is_forecast_is_made_with_the_prediction_move_in_precise_onl
         turns[mode] = move.motion.yaw_rad
     assert turns["paper"] == 0.0
     assert turns["precise"] == pytest.approx(math.radians(-8.0), abs=math.radians(1.5))
+
+
+def test_a_heading_that_nobody_knows_counts_as_exact_not_as_less_than_that() -> None:
+    unknown = UncertainMotion(Motion(), TURN_UNKNOWN)
+    assert unknown.then(forecast(0.01)).matrix[1, 1] == pytest.approx(0.01**2)
+    wide = [0.1**2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]
+    assert "beside the picture" in out_of_view(UncertainMotion(Motion(), tuple(wide)), 0.32, PlannerParameters())

@@ -101,6 +101,24 @@ def test_paths_can_share_texts_that_name_their_path() -> None:
 # --- by family --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("slalom.perood=3", "did you mean 'period'"),
+        ("slalom.period", "give 'period' once"),
+    ],
+)
+def test_a_wrong_text_for_another_path_is_refused(text: str, said: str) -> None:
+    with pytest.raises(ParameterError, match=said):
+        path("circle", text)
+    with pytest.raises(ParameterError, match="give 'period' once"):
+        path("switch", "parts=straight:2 circle", "circle.period=3", "circle.period=30")
+
+
+def test_a_circle_without_period_and_radius_has_a_period_of_12() -> None:
+    assert path("circle", "phase=0") == path("circle", "phase=0", "period=12")
+
+
 def test_straight_is_the_step_and_nothing_else() -> None:
     assert path("straight").motion(7) == Motion(x_m=0.05)
 

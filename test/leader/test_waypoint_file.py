@@ -129,3 +129,22 @@ def test_a_file_that_is_missing_or_no_text_is_refused(tmp_path: Path) -> None:
 def test_a_heading_along_a_way_that_stands_still_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="lines 2 and 3 are the same point"):
         made(tmp_path, "x_m,y_m\n0,0\n0,0\n0.05,0\n", "heading=along")
+
+
+def test_a_part_of_a_switch_longer_than_its_file_is_refused(tmp_path: Path) -> None:
+    file = written(tmp_path, "x_m,y_m\n0,0\n0.05,0\n0.1,0\n")
+    texts = [f"waypoints.file={file}"]
+    assert make_path("switch", ["parts=waypoints:2 straight", *texts]).motion(2) == Motion(0.05)
+    with pytest.raises(ParameterError, match="part 'waypoints:3' is longer than its 2 timesteps"):
+        make_path("switch", ["parts=waypoints:3 straight", *texts])
+
+
+def test_polynomials_without_a_header_are_refused_rather_than_their_first_piece_lost(tmp_path: Path) -> None:
+    row = ",".join(["1.0"] + ["0.0"] * 32)
+    with pytest.raises(ParameterError, match="begins with a header"):
+        made(tmp_path, f"{row}\n{row}\n{row}\n")
+
+
+def test_equal_times_are_no_gap(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="line 4: 't_s' must grow"):
+        made(tmp_path, "t_s,x_m,y_m\n0,0,0\n1,0.05,0\n1,0.1,0\n1,0.15,0\n")

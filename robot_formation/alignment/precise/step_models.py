@@ -173,7 +173,7 @@ class StepModels:
         loss_m = _LEG_LOSS_M * min(1.0, _SHORT_LEG_M / max(abs(left), _LEG_LOSS_M))
         driven_m = abs(left) - loss_m if abs(left) >= self._least_leg_m else 0.0
         step = Motion.from_legs(turn, forward, math.copysign(max(driven_m, 0.0), left))
-        way_m = step.x_m + math.copysign(self.turning_way_m(step), step.x_m)
+        way_m = abs(step.x_m) + self.turning_way_m(step)  # down the slope, ahead or back
         return Motion(step.x_m, step.y_m + own.slip * way_m, step.yaw_rad)
 
     def turning_way_m(self, step: Motion) -> float:

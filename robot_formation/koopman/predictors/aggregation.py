@@ -1,10 +1,4 @@
-"""Aggregation of experts' forecasts with a guarantee: never much worse than the best of them, without any tuning.
-
-ML-Poly (Gaillard, Stoltz and van Erven, "A second-order bound with excess losses", COLT 2014, algorithm 2): expert k
-has the weight p_k ~ prior_k eta_k max(R_k, 0), R_k being the sum of its instantaneous regrets r_k, and
-eta_k = 1 / (B^2 + sum r_k^2) its own learning rate, B the largest |r_k| so far. For the square loss regrets are those
-of its gradient. The sum of losses is at most that of the best expert plus a term in sqrt(log log T sum r_k^2).
-"""
+"""Aggregation of experts' forecasts: weights that follow the experts' errors so far."""
 
 from __future__ import annotations
 
@@ -15,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
-from robot_formation.koopman.predictors.models import Vector, array
-
-NU = 5.0
-"""Degrees of freedom of the errors' distribution (Student): an outlier must not decide."""
+from robot_formation.koopman.predictors.models import NU, Vector, array
 
 
 class Aggregation(Protocol):
@@ -39,7 +30,13 @@ class Aggregation(Protocol):
 
 
 class MlPoly:
-    """Weights without a learning rate."""
+    """Weights without a learning rate, after ML-Poly (Gaillard, Stoltz and van Erven, "A second-order bound with excess
+    losses", COLT 2014), whose losses are never much larger than the best expert's.
+
+    Expert k has the weight p_k ~ prior_k eta_k max(R_k, 0), R_k being the sum of its instantaneous regrets r_k, and
+    eta_k = 1 / (B^2 + sum r_k^2) its own learning rate, B the largest |r_k| so far. For the square loss regrets are
+    those of its gradient. Prior and B, which stands for a bound known beforehand, are additions.
+    """
 
     def __init__(self, prior: Vector, scale: float) -> None:
         """Begin with the prior (experts,), which adds up to 1; losses are in units of `scale` squared."""
@@ -76,10 +73,12 @@ class MlPoly:
         self._regrets = array(state["regrets"], len(self._prior))
         self._squares = array(state["squares"], len(self._prior))
         self._largest = float(array(state["largest"]))
+        if (self._squares < 0.0).any() or self._largest < 0.0:
+            raise ValueError("a sum of squares is negative")
 
 
 class ExponentialWeights:
-    """Discounted exponential weights by the likelihood of a Student distribution of errors."""
+    """Discounted exponential weights by the likelihood of a Student distribution of errors; no bound is proved."""
 
     def __init__(self, prior: Vector, scale: float, discount: float) -> None:
         """Begin with the prior (experts,); errors are in units of `scale`."""

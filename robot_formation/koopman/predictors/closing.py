@@ -21,15 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
-from robot_formation.koopman.predictors.models import Diagnostics, Matrix, TrendFilter, Vector, array, covariance
+from robot_formation.koopman.predictors.models import NU, Diagnostics, Matrix, TrendFilter, Vector, array, covariance
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 from robot_formation.koopman.predictors.spatial import Spatial, after, rotated
 
 # A move that ends farther from its command has met an obstacle or was never carried out.
 _LARGEST_BIAS_M = 0.03
 _LARGEST_BIAS_RAD = 0.1
-# Degrees of freedom of the innovations' distribution (Student): an outlier must not decide.
-NU = 5.0
 _ONWARD = np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 

@@ -15,10 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
-from robot_formation.koopman.predictors.models import Matrix, Vector, covariance, packed, unpacked
-
-# Degrees of freedom of the innovations' distribution (Student): an outlier must not decide.
-NU = 5.0
+from robot_formation.koopman.predictors.models import NU, Matrix, Vector, covariance, packed, unpacked
 
 
 @dataclass(frozen=True)
@@ -81,7 +78,7 @@ class FilterBank:
         values, variances_seen = residual[m.axes], camera[m.axes]
         known = np.isfinite(values)
         if known.any():
-            losses = self._discount * self._losses
+            losses = np.where(known.any(axis=1), self._discount * self._losses, self._losses)
             for j in range(seen):
                 variances = covariances[:, j, j] + variances_seen[:, j]
                 innovations = np.where(known[:, j], values[:, j] - means[:, j], 0.0)

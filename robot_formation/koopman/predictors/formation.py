@@ -89,14 +89,16 @@ class MixedExperts:
         seen = np.full(3, np.nan) if residual is None else residual
         self._seen |= np.isfinite(seen)
         turn = float(displacement[2])
-        self._last_turn = turn if not self._seen[2] else 0.0
+        blind = residual is None and bool(self._seen[:2].any())
+        if not blind:
+            self._last_turn = turn if not self._seen[2] else 0.0
         before = float(self.residual[2])
         if before:  # w is told in the frame of the place that the robot should have had
             w = self._mixed(self._steps[:, 0])[:2]
             self._shift(rotated(w, before) - w)
         seen = np.append(rotated(seen[:2], turn), seen[2])
-        seen[~self._seen] = 0.0
-        if residual is not None or not self._seen[:2].any():
+        if not blind:
+            seen[~self._seen] = 0.0
             self._judge(displacement + seen)
         camera = np.where(self._seen, self._camera, _EXACT)
         for expert in self.experts.values():

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
-from robot_formation.koopman.predictors.models import Matrix, Vector, array
-from robot_formation.koopman.predictors.spatial import after, rotated, ways
+from robot_formation.koopman.predictors.models import Matrix, Vector, array, covariance
+from robot_formation.koopman.predictors.spatial import after, between, ways
 
 MOST_STEPS = 10
 """Timesteps ahead whose errors are observed; farther ones are scaled up from these."""
@@ -69,7 +69,7 @@ class HorizonErrors:
         errors = _all_after(driven, residual) - self._expected[numbers, numbers]
         self._count(self._ways, 0, errors)
         if before is not None:
-            w = _from(before, after(total, residual))
+            w = between(before, after(total, residual))
             self._count(self._steps, 1, w - self._pending[numbers, numbers])
 
     def _count(self, moments: NDArray[np.float64], kind: int, errors: Matrix) -> None:
@@ -103,8 +103,8 @@ class HorizonErrors:
 
     def restore(self, state: Mapping[str, Json]) -> None:
         """Restore what `state` returned."""
-        self._steps = array(state["steps"], *self._steps.shape)
-        self._ways = array(state["ways"], *self._ways.shape)
+        self._steps = covariance(state["steps"], *self._steps.shape)
+        self._ways = covariance(state["ways"], *self._ways.shape)
         self._weights = array(state["weights"], *self._weights.shape)
         if (self._weights < 0.0).any():
             raise ValueError("a weight is negative")
@@ -124,8 +124,3 @@ def _all_after(first: Matrix, second: Vector) -> Matrix:
         return np.asarray(first + second)
     cosines, sines, (u, v, turn) = np.cos(headings), np.sin(headings), second.tolist()
     return np.asarray(first + np.stack([cosines * u - sines * v, sines * u + cosines * v, 0 * sines + turn], axis=1))
-
-
-def _from(before: Vector, now: Vector) -> Vector:
-    """Return the motion (3,) that leads from one pose to another."""
-    return np.append(rotated(now[:2] - before[:2], -float(before[2])), now[2] - before[2])

@@ -21,6 +21,9 @@ from robot_formation.koopman.quality import EigenvalueQuality
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
+NU = 5.0
+"""Degrees of freedom of the errors' distribution (Student): an outlier must not decide."""
+
 
 @dataclass(frozen=True)
 class Diagnostics:
@@ -269,7 +272,8 @@ def covariance(values: ArrayLike, *shape: int) -> NDArray[np.float64]:
     found = array(values, *shape)
     turned = np.swapaxes(found, -1, -2)
     eigenvalues = np.linalg.eigvalsh(found)  # ascending
-    if not (found == turned).all() or not (eigenvalues[..., 0] >= -1e-9 * abs(eigenvalues[..., -1])).all():
+    largest = abs(eigenvalues[..., -1])
+    if (abs(found - turned) > 1e-9 * largest[..., None, None]).any() or (eigenvalues[..., 0] < -1e-9 * largest).any():
         raise ValueError("covariance matrices are expected")
     return found
 

@@ -80,15 +80,23 @@ def _sorted_by_owner(name: str, texts: Sequence[str]) -> tuple[list[str], dict[s
     """Return a path's own texts, and the values by name of those that belong to other paths.
 
     Raises:
-        ParameterError: if a text is for a path that doesn't exist.
+        ParameterError: if a text is for a path or parameter that doesn't exist, or no value, or given twice.
     """
-    own, others = [], {}
+    own: list[str] = []
+    others: dict[str, str] = {}
     for text in texts:
-        key, _, value = text.partition("=")
+        key, equals, value = text.partition("=")
         owner, dot, parameter_name = key.strip().partition(".")
         if not dot:
             own.append(text)
-        elif path_kind(owner) is path_kind(name):
+            continue
+        known = specs(path_kind(owner))
+        if parameter_name not in known:
+            hint = suggestion(parameter_name, known)
+            raise ParameterError(f"path '{owner}': no parameter '{parameter_name}'{hint}")
+        if not equals or key.strip() in others:
+            raise ParameterError(f"path '{owner}': give '{parameter_name}' once, like {key.strip()}=12")
+        if path_kind(owner) is path_kind(name):
             own.append(f"{parameter_name}={value}")
         else:
             others[key.strip()] = value.strip()

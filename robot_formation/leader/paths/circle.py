@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from robot_formation.geometry.se2 import Motion
-from robot_formation.leader.paths.base import Direction, Heading, PathKind
+from robot_formation.leader.paths.base import Direction, Given, Heading, LeaderPath, PathKind
 from robot_formation.leader.paths.straight import STEP
 from robot_formation.parameters import ParameterError, parameter
 
@@ -47,6 +47,10 @@ class Circle(PathKind):
                 f"path 'circle': a step of {self.step_m:g} m doesn't fit into a radius of {self.radius_m:g} m; "
                 f"the radius must be at least {0.5 * self.step_m:g} m"
             )
+
+    def prepared(self, given: Given) -> LeaderPath:
+        """See `PathKind`: without a period and a radius the period is 12."""
+        return self if self.period or self.radius_m else replace(self, period=_PERIOD)
 
     @property
     def turn_rad(self) -> float:

@@ -57,6 +57,10 @@ class Switch(PathKind):
                 raise ParameterError(f"path 'switch': '{name}' can't be a part of it")
             own = [f"{key}={value}" for key, value in texts.items()]
             made[name] = made.get(name) or make(name, own, given)
+        for name, count in sequence:
+            most = made[name].timesteps
+            if most is not None and count is not None and count > most:
+                raise ParameterError(f"path 'switch': part '{name}:{count}' is longer than its {most} timesteps")
         return _Joined(tuple((made[name], count) for name, count in sequence))
 
 

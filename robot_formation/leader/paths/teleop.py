@@ -24,5 +24,5 @@ class Teleop(PathKind):
     max_turn_deg: float = parameter(8.0, "largest turn of a timestep", unit="deg", low=0.0, high=60.0)
 
     def motion(self, timestep: int) -> Motion:
-        """See `LeaderPath`: what nobody drives stands still."""
+        """See `LeaderPath`: without a command there is no motion."""
         return Motion()

@@ -17,7 +17,7 @@ PHASE = parameter(0.0, "where in the period timestep 1 begins; not given: by the
 
 @dataclass(frozen=True)
 class Slalom(Curve):
-    """Step_m forward and a cosine sideways, to the left first, in every timestep."""
+    """Forward by step_m and sideways by a cosine in every timestep."""
 
     name: ClassVar[str] = "slalom"
     step_m: float = STEP

@@ -44,6 +44,8 @@ def read_motions(path: Path, step_s: float, scale: float = 1.0, *, along: bool =
     header, rows = lines[0], lines[1:]
     names = tuple(name.strip() for name in header)
     if len(names) == POLYNOMIAL_COLUMNS:
+        if all(map(_is_number, names)):
+            raise ParameterError(f"{path}: its first line holds numbers; a file of polynomials begins with a header")
         return _between(_from_polynomials(path, _numbers(path, rows, names), step_s), scale)
     known = (MOTIONS, POSES[:2], POSES, (TIME, *POSES[:2]), (TIME, *POSES))
     if names not in known:
@@ -61,6 +63,14 @@ def read_motions(path: Path, step_s: float, scale: float = 1.0, *, along: bool =
     if names[0] == TIME:
         return _between(_resampled(path, values, step_s, with_heading=with_heading), scale)
     return _between([Motion(*row) for row in values], scale)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _lines(path: Path) -> list[list[str]]:
@@ -143,6 +153,7 @@ def _resampled(path: Path, rows: Sequence[Row], step_s: float, *, with_heading: 
     for number, span in enumerate(spans, start=3):
         if span <= 0.0:
             raise ParameterError(f"{path}: line {number}: 't_s' must grow from line to line")
+    for number, span in enumerate(spans, start=3):
         if span > _GAP * usual:
             raise ParameterError(
                 f"{path}: a gap of {span:g} s before line {number}, where lines are {usual:g} s apart otherwise; "

@@ -134,3 +134,9 @@ def test_a_look_that_judges_only_some_models_changes_nothing() -> None:
     made.judge([(0, 1.0)])
     made.judge([])
     assert made.costs == before
+
+
+def test_slip_goes_down_the_slope_ahead_and_back() -> None:
+    for forward in (0.05, -0.05):
+        ahead, *_ = models(Motion(forward))
+        assert ahead.step.y_m == pytest.approx(OWN.slip * 0.05)

@@ -8,8 +8,8 @@ import pytest
 
 from predictor_helpers import HISTORY, predictor, timesteps, whole
 from robot_formation.koopman.predictors import NAMES, PredictorParameters
-from robot_formation.koopman.predictors.closing import NU, Closing, ResidualFilter
-from robot_formation.koopman.predictors.models import Previous
+from robot_formation.koopman.predictors.closing import Closing, ResidualFilter
+from robot_formation.koopman.predictors.models import NU, Previous
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 from robot_formation.koopman.predictors.predictor import Predictor
 from robot_formation.koopman.predictors.spatial import Spatial

@@ -32,6 +32,26 @@ def pulse(count: int, period: float) -> Array:
     return np.stack([np.zeros(count), 0.03 + 0.02 * np.cos(angles), np.zeros(count)], axis=1)
 
 
+def test_a_blind_timestep_teaches_nothing_of_a_turn_that_was_never_seen() -> None:
+    found = predictor(name="formation")
+    for _ in range(5):
+        found.observe(np.array([0.0, 0.05, 0.0]), np.array([0.0, 0.0, math.nan]))
+    for _ in range(3):
+        found.observe(np.array([0.0, 0.05, 0.05]), None)
+    assert abs(float(found.predict().mean[2])) < 1e-3
+
+
+def test_a_bank_weighs_only_the_filters_that_saw_something() -> None:
+    known, p = PriorKnowledge(ClosingParameters()), OscillatorParameters()
+    bank = FilterBank(turning(known, p, np.array([9.0, -9.0]), level=True), 0.9, 10)
+    bank.observe(np.array([0.01, 0.05, 0.0]), np.array([0.01, 0.02, 0.0]), np.full(3, 1e-5))
+    before = bank.losses
+    bank.observe(np.array([0.0, 0.05, 0.0]), np.full(3, math.nan), np.full(3, 1e-5))
+    assert (bank.losses == before).all()
+    bank.observe(np.array([0.0, 0.05, 0.0]), np.array([0.01, math.nan, 0.0]), np.full(3, 1e-5))
+    assert (bank.losses != before).all()
+
+
 # --- filters --------------------------------------------------------------------------------------------------------
 
 
