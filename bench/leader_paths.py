@@ -406,6 +406,8 @@ def figure(args: argparse.Namespace) -> int:
                 if found:
                     places.append(row + 0.14 * (number_ - (len(MARKS) - 1) / 2))
                     values.append([100.0 * rank(r) / (TIMESTEPS - COLLECTION_TIMESTEPS) for r in found.values()])
+            if not values:
+                continue
             values = [[value for value in v if math.isfinite(value)] or [math.nan] for v in values]  # without lost runs
             medians = [float(np.median(v)) for v in values]
             spread = np.array([np.abs(np.quantile(v, (0.25, 0.75)) - np.median(v)) for v in values])
@@ -427,7 +429,7 @@ def figure(args: argparse.Namespace) -> int:
         panel.set_axisbelow(True)
     panels[0].set_yticks(range(len(paths)), paths)
     panels[0].invert_yaxis()
-    legend_below(sheet, list(handles.values()), 3 if len(surfaces) == 1 else len(handles))
+    legend_below(sheet, list(handles.values()), min(2 * len(surfaces), len(handles)))
     save_figure(sheet, args.file)
     print(args.file)
     return 0
