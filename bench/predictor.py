@@ -10,6 +10,7 @@ Run: python bench/predictor.py [--rounds N] [--timesteps N] [--json]
 
 import argparse
 import json
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -43,7 +44,7 @@ def of_predictor(name: str) -> Timestep:
     predictor = Predictor(from_mapping(PredictorParameters, {**node_defaults("predictor"), "name": name}, where=name))
 
     def timestep(x: Array, r: Array, c: Array) -> None:
-        predictor.observe(x, r, c)
+        predictor.observe(np.append(x, 0.0), np.append(r, math.nan), np.append(c, 0.0))  # as in mode paper: no turns
         predictor.predict()
 
     return timestep
