@@ -81,8 +81,8 @@ def forecast_log(log: DisplacementLog, parameters: PredictorParameters, horizon:
             )
         except PredictionError as error:
             raise AnalysisError(
-                f"{log.source}, {place}: {error}; correct it, or raise the bound (read as metres, unless --unit says "
-                "otherwise, and radians)"
+                f"{log.source}, {place}: {error}; correct it, or raise predictor.max_u_m, max_v_m or max_turn_rad "
+                "(read as metres, unless --unit says otherwise, and radians)"
             ) from error
     statistics = error_statistics(log.targets_m - means, covariances)
     horizons = tuple({"h": h, **_way_statistics(log, ahead, h)} for h in range(1, horizon + 1))
