@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -25,7 +26,7 @@ def run_parallel(function: Callable[..., T], arguments: Iterable[tuple[object, .
     # One task in a worker at a time; a few wait, so that no worker idles.
     pool = Parallel(n_jobs=jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
     with _quiet_manager():
-        with _without_interrupts():  # the workers start here, and inherit it
+        with _without_interrupts(), _quiet_tracker():  # the workers start here, and inherit both
             results = pool(delayed(_uninterrupted)(jobs > 1, function, entry) for entry in arguments)
         yield from results
 
@@ -51,6 +52,23 @@ def _without_interrupts() -> Iterator[None]:
     finally:
         signal.signal(signal.SIGINT, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+
+@contextlib.contextmanager
+def _quiet_tracker() -> Iterator[None]:
+    """Let processes be started that don't print warnings of loky's resource tracker.
+
+    It is a process of its own, which after an interrupt may want to remove what the pool has removed already.
+    """
+    name, before = "PYTHONWARNINGS", os.environ.get("PYTHONWARNINGS")
+    os.environ[name] = ",".join(filter(None, (before, "ignore:resource_tracker:UserWarning")))
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
 
 
 @contextlib.contextmanager
