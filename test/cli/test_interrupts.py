@@ -56,7 +56,8 @@ def test_under_nohup_a_closed_terminal_ends_nothing(tmp_path: Path) -> None:
     def ignore() -> None:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
-    completed = interrupted_at(tmp_path, "numpy", *QUICK_RUN, number="SIGHUP", preexec_fn=ignore)
+    arguments = [*QUICK_RUN, "--bag", str(tmp_path / "bag")]
+    completed = interrupted_at(tmp_path, "numpy", *arguments, number="SIGHUP", preexec_fn=ignore)
     assert completed.returncode == 0
     assert "interrupted" not in completed.stderr
 
