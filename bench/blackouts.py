@@ -22,7 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
-from leader_paths import EDMD, PATHS, SURFACES, Task, print_table
+import leader_paths
+from leader_paths import PATHS, SURFACES, Task, print_table
 from robot_formation.analysis.quantities import FollowerAnalysis, analyse
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
@@ -72,24 +73,9 @@ def build(task: Task, settings: Sequence[str]) -> scenarios.Scenario:
     Raises:
         FormationError: on a misspelt or wrong setting KEY=VALUE.
     """
-    name, *parameters = PATHS[task.path]
     blackouts = ", ".join(f"[{first}, {length}]" for length, first in BLACKOUTS.items())
-    return scenarios.override(
-        scenarios.with_surface(scenarios.load_track("one"), task.surface),
-        [
-            "world.camera.mode=on_demand",
-            "world.overhead.enabled=false",
-            f"world.surface_parameters=[{', '.join(SURFACES[task.surface])}]",
-            f"leader.timesteps={TIMESTEPS}",
-            f"leader.path={name}",
-            f"leader.path_parameters=[{', '.join(parameters)}]",
-            f"blackouts=[{blackouts}]",
-            f"predictor.name={task.predictor}",
-            *(EDMD if task.predictor.startswith("edmd") else ()),
-            f"seed={task.seed}",
-            *settings,
-        ],
-    )
+    own = (f"leader.timesteps={TIMESTEPS}", f"blackouts=[{blackouts}]", "fine_tuner.mode=precise")
+    return leader_paths.build(task, [*own, *settings])
 
 
 def run_task(task: Task, settings: Sequence[str]) -> Row:

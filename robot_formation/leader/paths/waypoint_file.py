@@ -44,7 +44,11 @@ def read_motions(path: Path, step_s: float, scale: float = 1.0, *, along: bool =
     header, rows = lines[0], lines[1:]
     names = tuple(name.strip() for name in header)
     if len(names) == POLYNOMIAL_COLUMNS:
-        if all(map(_is_number, names)):
+        try:
+            _numbers(path, [header], names)
+        except ParameterError:
+            pass  # as it should be: names
+        else:
             raise ParameterError(f"{path}: its first line holds numbers; a file of polynomials begins with a header")
         return _between(_from_polynomials(path, _numbers(path, rows, names), step_s), scale)
     known = (MOTIONS, POSES[:2], POSES, (TIME, *POSES[:2]), (TIME, *POSES))
@@ -63,14 +67,6 @@ def read_motions(path: Path, step_s: float, scale: float = 1.0, *, along: bool =
     if names[0] == TIME:
         return _between(_resampled(path, values, step_s, with_heading=with_heading), scale)
     return _between([Motion(*row) for row in values], scale)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _lines(path: Path) -> list[list[str]]:
