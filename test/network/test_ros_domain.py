@@ -1,6 +1,7 @@
 """Two runs on one machine never share a ROS domain."""
 
 import contextlib
+import os
 import socket
 from pathlib import Path
 
@@ -8,14 +9,19 @@ import pytest
 
 from robot_formation.network import ros_domain
 from robot_formation.network.ros_domain import DOMAINS, DomainError, DomainReservation, domain_ports, free_domain
+from robot_formation.system.reservation import reserve
 
-# Ids that nobody uses: other tests and runs reserve theirs at the same time.
+# Ids that no run takes. Ports and reservations belong to the whole machine, so that two of these tests at a time would
+# take each other's domains: they run on one core, and their reservations have this process's id in their names.
 UNUSED = range(228, 232)
+
+pytestmark = pytest.mark.xdist_group("ros_domain")
 
 
 @pytest.fixture(autouse=True)
 def _own_domains(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ros_domain, "DOMAINS", UNUSED)
+    monkeypatch.setattr(ros_domain, "reserve", lambda name: reserve(f"{os.getpid()}_{name}"))
 
 
 def test_reservations_that_start_at_one_place_get_different_domains() -> None:
