@@ -3,6 +3,7 @@
 import math
 import re
 
+import numpy as np
 import pytest
 
 from robot_formation.analysis.quantities import FollowerAnalysis, analyse
@@ -46,6 +47,26 @@ def test_the_follower_turns_with_its_leader_and_keeps_its_place(circle: RunRecor
     assert abs(found.totals["heading_error_rmse_rad"]) < math.radians(3.0)
     turned = sum(timestep.moved.yaw_rad for timestep in found.timesteps)
     assert turned == pytest.approx(-14 * TURN_RAD, abs=0.15)
+
+
+def test_the_heading_of_a_turning_leader_is_checked_from_where_two_faces_show(circle: RunRecord) -> None:
+    recorded, found = follower(circle)
+    assert sum("two faces" in text for text in recorded.states) >= 2
+    # 14 timesteps of 4.8 degrees each, and a check after 11.5 degrees at the latest.
+    moved = [timestep.t for timestep in found.timesteps if timestep.corrections.v_m > 0.2]
+    assert len(moved) >= 3
+    assert max(np.diff(moved)) <= 4
+
+
+def test_a_turn_that_nothing_foretold_is_found_within_three_timesteps() -> None:
+    arc = "leader.path_parameters=[radius_m=0.716, angle_deg=24, before=8, direction=right]"
+    _, found = follower(run_in_memory(scenario("leader.path=arc", arc)))
+    errors = [timestep.heading_error_rad for timestep in found.timesteps if timestep.heading_error_rad is not None]
+    assert len(errors) == 14
+    assert max(map(abs, errors[:8])) < math.radians(3.0)
+    # Unnoticed, six turns of 4 degrees would be 24.
+    assert max(map(abs, errors)) < math.radians(13.0)
+    assert abs(errors[-1]) < math.radians(6.0)
 
 
 def test_turns_are_predicted_and_their_residuals_known(circle: RunRecord) -> None:

@@ -189,6 +189,13 @@ class PoseFilter:
             hypothesis.cost += cost
         self._prune()
 
+    def doubt_heading(self, sigma_rad: float) -> None:
+        """Take the heading for less certain than looks and forecasts made it, by an error of this deviation."""
+        variance = np.zeros((SIZE, SIZE))
+        variance[YAW, YAW] = sigma_rad**2
+        for hypothesis in self.hypotheses:
+            hypothesis.covariance = hypothesis.covariance + variance
+
     # --- moves ------------------------------------------------------------------------------------------------------
 
     def moved(self, motion: Motion) -> None:

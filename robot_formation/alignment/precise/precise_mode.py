@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from robot_formation.alignment.mode import Decision, Frames, Verdict
 from robot_formation.alignment.observation import FaceBox
 from robot_formation.alignment.precise.actuation_model import ActuationModel, ActuationParameters
+from robot_formation.alignment.precise.heading_check import HeadingCheck, HeadingCheckParameters
 from robot_formation.alignment.precise.marker_edges import EdgeParameters, mean_boxes
 from robot_formation.alignment.precise.marker_projection import (
+    YAW,
     GeometryParameters,
     MarkerModel,
     Vector,
@@ -33,6 +35,12 @@ _IMPLAUSIBLE_NIS = 6.0
 _VIEWPOINTS_M = (0.135, -0.135, 0.135, -0.12, 0.12)
 """Places along v [m] from where a second face is wide enough to be measured well, in the order of visits; the side on
 which the neighbour stands is the positive one."""
+_CHECK_PLACES_M = (-0.135, 0.135)
+"""The same of a check of the heading, which ends where a second face shows: first where the follower came from."""
+_SECOND_FACE_PX = 8.0
+"""Width from which on a second face tells the heading."""
+_LEAST_FORECAST_SIGMA_M = 0.0035
+"""A forecast's error aside is never taken for smaller: the looks' own is 2 to 3 mm."""
 _VIEWPOINT_NEARER_M = 0.008
 """How much nearer to the neighbour than in formation these places lie."""
 _VIEWPOINT_TOLERANCE = Motion(0.02, 0.02, math.radians(6.0))
@@ -93,6 +101,7 @@ class PreciseParameters:
     actuation: ActuationParameters = ActuationParameters()
     approach: PlannerParameters = PlannerParameters()
     search: SearchParameters = SearchParameters()
+    heading_check: HeadingCheckParameters = HeadingCheckParameters()
 
 
 class PreciseAlignment:
@@ -111,6 +120,9 @@ class PreciseAlignment:
         self._planner = MotionPlanner(parameters.approach)
         self._actuation = ActuationModel(parameters.actuation, parameters.filter.move_floor_m)
         self._search = NeighbourSearch(parameters.search)
+        self._check = HeadingCheck(parameters.heading_check)
+        self._stepped = False  # the neighbour, and no look since then
+        self._expected_rad: float | None = None  # the heading, while it is checked
         self._formation = Motion(y_m=-formation_distance_m)  # position in the neighbour's frame
         self._moves = 0
         self._timestep = 0
@@ -123,11 +135,15 @@ class PreciseAlignment:
         self._moves = 0
         self._timestep = timestep
         self._last = Motion()
+        self._expected_rad = None
         if timestep == 0:
             return
+        self._viewpoints = []
         step = step or UncertainMotion(Motion())
         self._way = None if self._way is None else self._way.then(step)
         neighbours = step.between(self._formation, self._formation.inverse())
+        self._check.stepped(neighbours.mean.yaw_rad)
+        self._stepped = True
         self._filter.neighbour_stepped(neighbours, self._actuation.drives_so_far, timestep == 1)
 
     def turn(self, forecast_rad: float) -> float:
@@ -142,6 +158,8 @@ class PreciseAlignment:
         self._filter.moved(motion)
         self._actuation.moved(asked, motion)
         self._last = motion
+        if self._expected_rad is not None:
+            self._expected_rad -= motion.yaw_rad
         self._way = None if self._way is None else self._way.after(motion)
 
     def offset(self) -> UncertainMotion | None:
@@ -173,18 +191,41 @@ class PreciseAlignment:
         self._search.found()
         first = not self._filter.known
         self._filter.look(boxes)
+        self._check_heading(boxes)
         self._way = self.offset()
         if first and set(boxes) == {Face.TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             self._viewpoints = []
         return self._correct()
 
+    def _check_heading(self, boxes: dict[Face, FaceBox]) -> None:
+        """Begin or end a check of the heading by what the latest look shows."""
+        heading_rad = float(self._filter.best.state[YAW])
+        if self._expected_rad is not None:
+            if len(boxes) > 1 and min(box.width for box in boxes.values()) >= _SECOND_FACE_PX:
+                self._viewpoints = []
+        elif self._stepped and self._check.due(self._beside_sigmas(), self._filter.yaw_sigma_rad):
+            self._filter.doubt_heading(self._p.heading_check.doubt_rad)
+            self._expected_rad, self._viewpoints = heading_rad, None
+        self._stepped = False
+
+    def _beside_sigmas(self) -> float:
+        """Return how far aside of its forecast the neighbour's step ended, in standard deviations."""
+        expected, found = self._way, self.offset()
+        if expected is None or found is None:
+            return 0.0
+        sigma_m = max(_LEAST_FORECAST_SIGMA_M, math.sqrt(max(0.0, float(expected.matrix[1, 1]))))
+        return (found.mean.y_m - expected.mean.y_m) / sigma_m
+
     def _correct(self) -> Decision:
         p, state = self._p, self._filter.best.state
         unsure = self._filter.yaw_sigma_rad > p.certain_rad
         motion, reason = Motion(), ""
-        if unsure and self._timestep == 0 and self._viewpoints != []:
+        if self._viewpoints != [] and (self._expected_rad is not None or (unsure and self._timestep == 0)):
             motion, reason = self._to_see_more(state)
+        if self._expected_rad is not None and self._viewpoints == []:
+            self._check.done(float(state[YAW]) - self._expected_rad)
+            self._expected_rad = None
         if motion == Motion():
             if self._within(pose_of(state).then(self._formation)):
                 return Decision(Verdict.ALIGNED, reason="inside the tolerances")
@@ -270,8 +311,11 @@ class PreciseAlignment:
         The outer edges of Front and Rear are biased alike, so that the two sides' errors in heading cancel.
         """
         if self._viewpoints is None:
-            behind = pose_of(state).x_m > 0.0
-            self._viewpoints = [-place if behind else place for place in _VIEWPOINTS_M]
+            if self._timestep > 0:
+                self._viewpoints = list(_CHECK_PLACES_M)
+            else:
+                behind = pose_of(state).x_m > 0.0
+                self._viewpoints = [-place if behind else place for place in _VIEWPOINTS_M]
         while self._viewpoints:
             yield Motion(self._viewpoints[0], self._formation.y_m + _VIEWPOINT_NEARER_M, 0.0)
             self._viewpoints.pop(0)

@@ -87,6 +87,26 @@ def test_the_way_to_formation_leads_there(x_m: float, y_m: float, yaw_rad: float
     assert there[:3] == pytest.approx((0.0, FORMATION_DISTANCE_M, 0.0), abs=1e-12)
 
 
+@pytest.mark.parametrize("turn_deg", [-9.0, 9.0])
+def test_a_heading_that_is_wrongly_believed_is_found_from_behind_once_it_is_doubted(turn_deg: float) -> None:
+    errors_deg = {}
+    for doubt_rad in (0.0, 0.075):
+        truth, found = state_of(0.0, 0.32, 0.0), new_filter()
+        look(found, truth)
+        found.assume_heading(math.radians(1.0))
+        turned = truth.copy()
+        turned[YAW] = math.radians(turn_deg)  # on the spot, unseen
+        found.doubt_heading(doubt_rad)
+        for x_m in (0.135, -0.135):
+            turned_there = after_motion(turned, Motion(-x_m, 0.0))
+            found.moved(Motion(-x_m, 0.0))
+            look(found, turned_there)
+            found.moved(Motion(x_m, 0.0))
+        errors_deg[doubt_rad] = abs(math.degrees(float(found.best.state[YAW])) - turn_deg)
+    assert errors_deg[0.075] < 2.5
+    assert errors_deg[0.0] > errors_deg[0.075]
+
+
 def test_the_covariance_stays_symmetric_and_positive() -> None:
     truth, found = state_of(0.05, 0.4, 0.2), new_filter()
     for motion in (Motion(), Motion(0.1, 0.05, 0.1), Motion(-0.15, 0.0, 0.05)):

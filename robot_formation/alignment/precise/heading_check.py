@@ -1,0 +1,94 @@
+"""When to look at the neighbour's heading anew, from a place from where two of the marker's faces show.
+
+Straight aside of the marker one face shows, and the heading follows only from how far the neighbour's steps lead aside.
+For a leader that turns this is not enough: slip and forecast err alike step after step, which the filter takes for
+independent noise, and a turn that nothing foretold looks like a step aside. So after a turn of some size, or when steps
+end beside where they were expected, the follower drives to where the heading shows, as in its first alignment, and
+back.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from robot_formation.parameters import parameter
+
+# All chosen.
+_MEMORY = 0.6
+"""Share of earlier deviations in the sum that is compared with the bound: turns lead several steps to the same side."""
+_FOUND_RAD = math.radians(3.0)
+"""A heading that a check finds so far from where it was expected had turned unnoticed."""
+_FOLLOW_UPS = 2
+"""Checks in the timesteps after an unnoticed turn: from them the predictor learns the turn of a timestep."""
+_MOST_PATIENCE, _PATIENCE_KEPT = 16.0, 0.85
+"""Bound on the factor by which the bound on deviations grows, and what is left of it after a timestep."""
+
+
+@dataclass(frozen=True)
+class HeadingCheckParameters:
+    """What calls for a check."""
+
+    turned_rad: float = parameter(
+        0.2, "Turn of the neighbour by forecast, after which its heading is checked", unit="rad", low=1e-3, high=1000.0
+    )
+    beside_sigmas: float = parameter(
+        3.0,
+        "Deviation of steps aside from their forecasts, in standard deviations, from which on the heading is checked; "
+        "twice as much after each check that finds no turn",
+        low=0.1,
+        high=1e6,
+    )
+    sigma_rad: float = parameter(
+        0.05, "Standard deviation of the heading from which on it is checked", unit="rad", low=1e-3, high=1000.0
+    )
+    doubt_rad: float = parameter(
+        0.075,
+        "Standard deviation that the heading is given at the start of a check",
+        unit="rad",
+        low=1e-3,
+        high=1.0,
+    )
+
+
+class HeadingCheck:
+    """Keeps what calls for a check, from one timestep to the next."""
+
+    def __init__(self, parameters: HeadingCheckParameters) -> None:
+        self._p = parameters
+        self._turned_rad = 0.0
+        self._beside_sigmas = 0.0
+        self._patience = 1.0
+        self._follow_ups = 0
+        self._beside = False
+
+    def stepped(self, turn_rad: float) -> None:
+        """Process the forecast turn of the neighbour's step."""
+        self._turned_rad += turn_rad
+        self._patience = max(1.0, _PATIENCE_KEPT * self._patience)
+
+    def due(self, beside_sigmas: float, sigma_rad: float) -> bool:
+        """Tell after a timestep's first look whether the heading is to be checked.
+
+        Args:
+            beside_sigmas: how far aside of its forecast the neighbour's step ended, in standard deviations.
+            sigma_rad: standard deviation of the heading.
+        """
+        p = self._p
+        self._beside_sigmas = _MEMORY * self._beside_sigmas + beside_sigmas
+        self._beside = False
+        if self._follow_ups:
+            self._follow_ups -= 1
+            return True
+        self._beside = abs(self._beside_sigmas) > self._patience * p.beside_sigmas
+        return self._beside or abs(self._turned_rad) > p.turned_rad or sigma_rad > p.sigma_rad
+
+    def done(self, change_rad: float) -> None:
+        """Process a check: by how much it changed the heading."""
+        self._turned_rad = self._beside_sigmas = 0.0
+        if not self._beside:
+            return
+        if abs(change_rad) > _FOUND_RAD:
+            self._patience, self._follow_ups = 1.0, _FOLLOW_UPS
+        else:
+            self._patience = min(_MOST_PATIENCE, 2.0 * self._patience)

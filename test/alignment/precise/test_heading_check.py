@@ -1,0 +1,84 @@
+"""When a heading is checked: after turns, after steps that end beside their forecasts, and where it is hardly known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from robot_formation.alignment.precise.heading_check import HeadingCheck, HeadingCheckParameters
+
+P = HeadingCheckParameters()
+KNOWN_RAD = 0.5 * P.sigma_rad
+
+
+def checks(beside_sigmas: list[float], *, turn_rad: float = 0.0, found_rad: float = 0.0) -> list[int]:
+    """Timesteps, from 1 on, that check; each check changes the heading by `found_rad`."""
+    check = HeadingCheck(P)
+    timesteps = []
+    for timestep, beside in enumerate(beside_sigmas, 1):
+        check.stepped(turn_rad)
+        if check.due(beside, KNOWN_RAD):
+            timesteps.append(timestep)
+            check.done(found_rad)
+    return timesteps
+
+
+def test_a_neighbour_that_goes_where_it_is_expected_to_is_never_checked() -> None:
+    noise = np.random.default_rng(1).normal(0.0, 0.5, 1000)
+    assert checks(noise.tolist(), turn_rad=0.0) == []
+
+
+@pytest.mark.parametrize("turn_deg", [8.0, -8.0, 4.0])
+def test_a_turning_neighbour_is_checked_whenever_it_has_turned_so_far(turn_deg: float) -> None:
+    every = math.floor(P.turned_rad / abs(math.radians(turn_deg))) + 1
+    assert checks([0.0] * 30, turn_rad=math.radians(turn_deg)) == list(range(every, 31, every))
+
+
+def test_turns_to_and_fro_cancel() -> None:
+    check = HeadingCheck(P)
+    for timestep in range(100):
+        check.stepped(math.copysign(0.75 * P.turned_rad, timestep % 2 - 0.5))
+        assert not check.due(0.0, KNOWN_RAD)
+
+
+def test_several_small_deviations_to_one_side_count_as_a_large_one() -> None:
+    step = 0.7 * P.beside_sigmas
+    assert checks([1.1 * P.beside_sigmas]) == [1]
+    assert checks([step, step]) == [2]
+    assert checks([step, -step, step, -step]) == []
+
+
+def test_each_check_that_finds_no_turn_doubles_the_bound() -> None:
+    far = 1.1 * P.beside_sigmas
+    one, *later = checks([far] * 12)
+    assert one == 1
+    assert later[0] > 2
+    found = checks([far] * 12, found_rad=0.2)
+    assert found == list(range(1, 13))  # follow-ups, and then the bound as it was
+
+
+def test_after_an_unnoticed_turn_two_more_timesteps_are_checked() -> None:
+    assert checks([1.1 * P.beside_sigmas, 0.0, 0.0, 0.0, 0.0], found_rad=0.2) == [1, 2, 3]
+    assert checks([1.1 * P.beside_sigmas, 0.0, 0.0, 0.0, 0.0], found_rad=0.01) == [1]
+
+
+def test_a_check_that_was_called_for_by_turns_finds_no_fault_with_the_forecasts() -> None:
+    every = math.floor(P.turned_rad / 0.15) + 1
+    assert checks([0.0] * 8, turn_rad=0.15, found_rad=0.2) == list(range(every, 9, every))
+
+
+def test_a_heading_that_is_hardly_known_is_checked() -> None:
+    check = HeadingCheck(P)
+    check.stepped(0.0)
+    assert check.due(0.0, 1.01 * P.sigma_rad)
+    check.done(0.0)
+    check.stepped(0.0)
+    assert not check.due(0.0, 0.99 * P.sigma_rad)
+
+
+def test_a_check_that_was_not_made_is_still_called_for() -> None:
+    check = HeadingCheck(P)
+    check.stepped(1.01 * P.turned_rad)
+    assert check.due(0.0, KNOWN_RAD)
+    check.stepped(0.0)
+    assert check.due(0.0, KNOWN_RAD)
