@@ -56,6 +56,9 @@ class AlignmentMode(Protocol):
     def assess(self, frames: Frames) -> Decision:
         """Decide what a look calls for."""
 
+    def caught_up_rad(self) -> float:
+        """Return the standard deviation [rad] of what the timestep's turn makes good of earlier ones."""
+
     def offset(self) -> UncertainMotion | None:
         """Estimate the way to the formation position after the last look; None if the look doesn't tell."""
 

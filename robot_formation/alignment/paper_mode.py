@@ -191,6 +191,10 @@ class PaperMode:
         self._blocks = frames[-1]
         return self._alignment.assess(self._blocks)
 
+    def caught_up_rad(self) -> float:
+        """See `AlignmentMode`: the rule table doesn't know the heading."""
+        return 0.0
+
     def offset(self) -> UncertainMotion | None:
         """See `AlignmentMode`; the rule table doesn't know the heading."""
         offset = self._alignment.offset(self._blocks)

@@ -12,7 +12,7 @@ from robot_formation.follower import fine_tuning as core
 from robot_formation.follower.alignment_state import State
 from robot_formation.follower.camera_calibration_file import calibrated
 from robot_formation.geometry.se2 import Motion
-from robot_formation.geometry.uncertain_motion import UncertainMotion
+from robot_formation.geometry.uncertain_motion import EXACT, UncertainMotion
 from robot_formation.names import Message
 
 
@@ -122,7 +122,7 @@ class FineTunerComponent(Component):
         # The predictor waits for the pair, so what it may use beside them goes first.
         for topic, motion in (
             (names.COMMANDED, None if report.commanded is None else UncertainMotion(report.commanded)),
-            (names.DISPLACEMENT, UncertainMotion(report.displacement)),
+            (names.DISPLACEMENT, UncertainMotion(report.displacement, (*EXACT[:-1], report.caught_up_rad**2))),
             (names.RESIDUAL, report.residual),
         ):
             mean, covariance = (

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,13 @@ from robot_formation.system.files import MOST_RECORD_BYTES, read_file
 _MOST_UNPAIRED = 16  # timesteps of which not all parts have come: in a run, one at a time
 
 
+class _Part(NamedTuple):
+    """A part of a timestep: (u, v, turn) [m, rad], None where there is no estimate, and the turn's deviation [rad]."""
+
+    motion: Vector | None
+    turn_sigma_rad: float = 0.0
+
+
 class PredictorComponent(Component):
     """Answers each pair of `displacement` and `residual` with a `prediction`."""
 
@@ -32,8 +39,7 @@ class PredictorComponent(Component):
         state_file = parameters.state_file.replace("{robot}", place.robot)
         self._state_file = Path(state_file) if state_file else None
         self.predictor = self._restored(parameters)
-        # By stamp, then topic: (u, v) [m] with a turn of 0, None where there is no estimate.
-        self._parts: dict[int, dict[names.Topic, Message]] = {}
+        self._parts: dict[int, dict[names.Topic, _Part]] = {}  # by stamp, then topic
         self._first_commanded_ns: int | None = None
 
     def _restored(self, parameters: PredictorParameters) -> Predictor:
@@ -118,20 +124,22 @@ class PredictorComponent(Component):
             self.warn(f"{there} of {oldest_ns} ns came without the rest of the timestep and is forgotten")
         self._answer(stamp_ns)
 
-    def _read(self, topic: names.Topic, message: Message) -> Any:
-        """Read (u, v, turn) of a displacement [m, rad], None where there is no estimate; NaN for a turn not known."""
+    def _read(self, topic: names.Topic, message: Message) -> _Part:
+        """Read a part; NaN stands for a turn not known."""
         if not conversions.has_estimate(message):
             if topic == names.DISPLACEMENT:
                 self.warn("a displacement without an estimate is left out")
-            return None
+            return _Part(None)
         motion = conversions.read_displacement(message)
         if not motion.finite:
             self.warn(
                 f"{topic.name}: ({motion.u_m}, {motion.v_m}) m, {motion.yaw_rad} rad is not finite; it is left out"
             )
-            return None
+            return _Part(None)
         unknown = topic == names.RESIDUAL and not conversions.knows_turn(message)
-        return np.array([motion.u_m, motion.v_m, math.nan if unknown else motion.yaw_rad])
+        *_, variance = conversions.read_covariance(message)
+        sigma_rad = math.sqrt(variance) if 0.0 < variance <= math.pi**2 else 0.0
+        return _Part(np.array([motion.u_m, motion.v_m, math.nan if unknown else motion.yaw_rad]), sigma_rad)
 
     def _answer(self, stamp_ns: int) -> None:
         """Predict once all parts of the timestep are here, in whatever order they came.
@@ -147,11 +155,12 @@ class PredictorComponent(Component):
             return
         self.stamp_ns = stamp_ns
         del self._parts[stamp_ns]
-        displacement = parts[names.DISPLACEMENT]
+        displacement, caught_up_rad = parts[names.DISPLACEMENT]
+        residual = parts[names.RESIDUAL].motion
         if displacement is not None:
-            commanded = parts[names.COMMANDED] if expected else None
+            commanded = parts[names.COMMANDED].motion if expected else None
             try:
-                self.predictor.observe(displacement, parts[names.RESIDUAL], commanded)
+                self.predictor.observe(displacement, residual, commanded, caught_up_rad=caught_up_rad)
             except PredictionError as error:
                 self.warn(str(error))
         try:
@@ -164,7 +173,7 @@ class PredictorComponent(Component):
         self._save()  # before the answer: whoever has it finds the state that goes with it
         # The fine-tuner waits for the prediction, so what it may use beside it goes first.
         covariance = covariance_xy(forecast.covariance)
-        self._send_answer(names.FORECAST, _motion(self.predictor.step(parts[names.RESIDUAL])), covariance)
+        self._send_answer(names.FORECAST, _motion(self.predictor.step(residual)), covariance)
         self._send_answer(names.PREDICTION, _motion(forecast.command), covariance_xy(forecast.about_command))
 
     def _send_answer(self, topic: names.Topic, mean: Motion, covariance: Sequence[float]) -> None:

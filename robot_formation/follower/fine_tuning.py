@@ -131,13 +131,20 @@ class RequestFrames:
 
 @dataclass(frozen=True)
 class Report:
-    """The timestep's net displacement, what is left by the camera's estimate (None: Target face not seen, or blind),
-    and what the displacement would have been had the prediction move gone as commanded (None: its end is unknown).
+    """What the predictor learns from a timestep.
+
+    Attributes:
+        displacement: net, measured.
+        residual: what is left by the camera's estimate; None: Target face not seen, or blind.
+        commanded: what the displacement would have been had the prediction move gone as commanded; None: its end is
+            unknown.
+        caught_up_rad: standard deviation of what the displacement's turn makes good of earlier timesteps.
     """
 
     displacement: Motion
     residual: UncertainMotion | None
     commanded: Motion | None
+    caught_up_rad: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -377,7 +384,7 @@ class FineTuner:
         commanded = None
         if (error := self._actuation_error) is not None:
             commanded = Motion(total.x_m - error.x_m, total.y_m - error.y_m, total.yaw_rad - error.yaw_rad)
-        return [Report(total, residual, commanded)]
+        return [Report(total, residual, commanded, self._alignment.caught_up_rad())]
 
     def _move(self, motion: Motion) -> list[Action]:
         self._phase = Phase.MOVE

@@ -214,6 +214,27 @@ def test_the_predictor_gets_residual_and_command_and_publishes_the_command() -> 
 # --- state file -----------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("variance", "expected_rad"), [(0.0, 0.0), (0.04, 0.2), (math.nan, 0.0), (math.inf, 0.0), (-1.0, 0.0), (1e3, 0.0)]
+)
+def test_the_variance_of_the_displacements_turn_reaches_the_predictor_if_it_is_one(
+    monkeypatch: pytest.MonkeyPatch, variance: float, expected_rad: float
+) -> None:
+    wire = wired("predictor", "follower_1", name="formation")
+    predictor, caught_up = wire.component.predictor, []
+    observe = predictor.observe
+
+    def watched(*parts: Any, caught_up_rad: float = 0.0) -> None:
+        caught_up.append(caught_up_rad)
+        observe(*parts, caught_up_rad=caught_up_rad)
+
+    monkeypatch.setattr(predictor, "observe", watched)
+    covariance = (*(0.0,) * 8, variance)
+    wire.give("displacement", conversions.displacement(Motion(0.05), BASE, 5, covariance))
+    wire.give("residual", conversions.displacement(Motion(), BASE, 5, (0.0,) * 9))
+    assert caught_up == [pytest.approx(expected_rad)]
+
+
 def drive(wire: Wire, stamps: Sequence[int], seed: int) -> list[str]:
     """Hand in random timesteps; the predictions."""
     rng = np.random.default_rng(seed)

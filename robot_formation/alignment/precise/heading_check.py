@@ -21,6 +21,8 @@ _FOUND_RAD = math.radians(3.0)
 """A heading that a check finds so far from where it was expected had turned unnoticed."""
 _FOLLOW_UPS = 2
 """Checks in the timesteps after an unnoticed turn: from them the predictor learns the turn of a timestep."""
+_CAUGHT_UP = 0.5
+"""Standard deviation of what a check makes good of earlier timesteps, share of what it finds."""
 _MOST_PATIENCE, _PATIENCE_KEPT = 16.0, 0.85
 """Bound on the factor by which the bound on deviations grows, and what is left of it after a timestep."""
 
@@ -52,7 +54,12 @@ class HeadingCheckParameters:
 
 
 class HeadingCheck:
-    """Keeps what calls for a check, from one timestep to the next."""
+    """Keeps what calls for a check, from one timestep to the next.
+
+    Attributes:
+        caught_up_rad: standard deviation of what the latest timestep's check makes good of earlier timesteps. After an
+            unnoticed turn it is 0: that was made in this timestep, as far as anybody knows.
+    """
 
     def __init__(self, parameters: HeadingCheckParameters) -> None:
         self._p = parameters
@@ -61,9 +68,11 @@ class HeadingCheck:
         self._patience = 1.0
         self._follow_ups = 0
         self._beside = False
+        self.caught_up_rad = 0.0
 
     def stepped(self, turn_rad: float) -> None:
         """Process the forecast turn of the neighbour's step."""
+        self.caught_up_rad = 0.0
         self._turned_rad += turn_rad
         self._patience = max(1.0, _PATIENCE_KEPT * self._patience)
 
@@ -87,6 +96,7 @@ class HeadingCheck:
         """Process a check: by how much it changed the heading."""
         self._turned_rad = self._beside_sigmas = 0.0
         if not self._beside:
+            self.caught_up_rad = _CAUGHT_UP * abs(change_rad)
             return
         if abs(change_rad) > _FOUND_RAD:
             self._patience, self._follow_ups = 1.0, _FOLLOW_UPS

@@ -162,6 +162,10 @@ class PreciseAlignment:
             self._expected_rad -= motion.yaw_rad
         self._way = None if self._way is None else self._way.after(motion)
 
+    def caught_up_rad(self) -> float:
+        """See `AlignmentMode`: a check may find that the neighbour has turned otherwise since the one before."""
+        return self._check.caught_up_rad
+
     def offset(self) -> UncertainMotion | None:
         """Estimate the way to the formation position in the follower's frame."""
         if not self._filter.known:

@@ -67,12 +67,15 @@ class ResidualFilter:
         self.weights: Matrix = self._weighted()
         """Weight of each filter for each axis, (filters, axes)."""
 
-    def observe(self, total: Vector, residual: Vector | None) -> None:
-        """Update with the total (axes,) of a timestep and the camera's residual (axes,), None if it saw none."""
+    def observe(self, total: Vector, residual: Vector | None, unsure: float = 0.0) -> None:
+        """Update with the total (axes,) of a timestep and the camera's residual (axes,), None if it saw none.
+
+        `unsure` is the variance of the total as a measure of what the leader did.
+        """
         means = self._means @ _ONWARD.T
         means[..., 0] -= total
         covariances = _ONWARD @ self._covariances @ _ONWARD.T
-        covariances[..., 0, 0] += self._noise
+        covariances[..., 0, 0] += self._noise + unsure
         if residual is not None:
             variances = covariances[..., 0, 0] + self._camera
             innovations = residual - means[..., 0]
@@ -131,14 +134,18 @@ class ClosedResidual:
         self.turn_seen = False
         """Whether any residual's turn was known yet."""
 
-    def observe(self, total: Vector, residual: Vector | None) -> None:
-        """Update with a timestep's total (3,) and the residual (3,) at its end; its turn may be NaN, unknown."""
+    def observe(self, total: Vector, residual: Vector | None, caught_up_rad: float = 0.0) -> None:
+        """Update with a timestep's total (3,) and the residual (3,) at its end; its turn may be NaN, unknown.
+
+        `caught_up_rad`: see `Predictor.observe`.
+        """
         turn_seen = residual is not None and not math.isnan(residual[2])
         before = float(self._turn.residual[0]) if self.turn_seen else 0.0
         self.seen = self.seen or residual is not None
         self.turn_seen = self.turn_seen or turn_seen
         if self.turn_seen:
-            self._turn.observe(total[2:], residual[2:] if turn_seen and residual is not None else None)
+            seen_turn = residual[2:] if turn_seen and residual is not None else None
+            self._turn.observe(total[2:], seen_turn, caught_up_rad**2)
         if before:  # w is told in the frame of the place that the robot should have had
             self._uv.shift(rotated(self._uv.step, before) - self._uv.step)
         turn = float(total[2])
@@ -216,15 +223,24 @@ class Closing:
         self._filter = ClosedResidual(parameters)
         self._bias = ActuationBias(parameters)
 
-    def observe(self, displacement: Vector, residual: Vector | None, commanded: Vector | None) -> None:
-        """Update with a timestep's total displacement, the camera's residual and the command, where they are known."""
+    def observe(
+        self,
+        displacement: Vector,
+        residual: Vector | None,
+        commanded: Vector | None,
+        caught_up_rad: float = 0.0,
+    ) -> None:
+        """Update with a timestep's total displacement, the camera's residual and the command, where they are known.
+
+        `caught_up_rad`: see `Predictor.observe`.
+        """
         if commanded is not None:
             self._bias.observe(displacement, commanded)
         found, blind = self._filter, residual is None
         if blind and not found.seen:  # nothing is known about residuals: displacements are all there is
             self._model.observe(displacement)
             return
-        found.observe(displacement, residual)
+        found.observe(displacement, residual, caught_up_rad)
         if blind:
             self._model.advance()
         else:

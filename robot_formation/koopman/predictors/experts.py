@@ -19,7 +19,7 @@ from robot_formation.koopman.predictors.parameters import EdmdParameters
 class Expert(Protocol):
     """A source of forecasts of (u, v, turn); NaN for axes of which it knows nothing."""
 
-    def observe(self, total: Vector, residual: Vector, camera: Vector) -> None:
+    def observe(self, total: Vector, residual: Vector, camera: Vector, unsure: Vector | None = None) -> None:
         """See `FilterBank.observe`."""
 
     def shift(self, change: Vector) -> None:
@@ -59,9 +59,9 @@ class BankExpert:
         losses = self._bank.losses
         self._weights = [weighted(losses[filters]) for _, filters in self._groups]
 
-    def observe(self, total: Vector, residual: Vector, camera: Vector) -> None:
+    def observe(self, total: Vector, residual: Vector, camera: Vector, unsure: Vector | None = None) -> None:
         """See `Expert`."""
-        self._bank.observe(total, residual, camera)
+        self._bank.observe(total, residual, camera, unsure)
         self._weigh()
 
     def shift(self, change: Vector) -> None:
@@ -105,7 +105,7 @@ class DmdExpert:
         self._filtered = filtered
         self._begun = False
 
-    def observe(self, total: Vector, residual: Vector, camera: Vector) -> None:
+    def observe(self, total: Vector, residual: Vector, camera: Vector, unsure: Vector | None = None) -> None:
         """See `Expert`; after the expert that filters."""
         if np.isnan(residual[:2]).any():
             self.model.advance()

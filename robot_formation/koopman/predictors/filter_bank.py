@@ -62,10 +62,11 @@ class FilterBank:
             rows.append(rows[-1] @ model.onward)
         self._rows = np.stack(rows, axis=1)  # (count, horizon, seen, size)
 
-    def observe(self, total: Vector, residual: Vector, camera: Vector) -> None:
+    def observe(self, total: Vector, residual: Vector, camera: Vector, unsure: Vector | None = None) -> None:
         """Update with a timestep's total (3,) and the residual (3,) at its end, told in the frame at its start.
 
-        `camera` (3,) is the residual's variance. A component of the residual that nobody saw is NaN.
+        `camera` (3,) is the residual's variance, `unsure` (3,) that of the total as a measure of what the leader did. A
+        component of the residual that nobody saw is NaN.
         """
         m, seen = self._m, self._seen
         means = self.means.copy()
@@ -74,7 +75,7 @@ class FilterBank:
         covariances[:, :seen] += m.readout @ covariances
         covariances[:, :, :seen] += covariances @ self._readout_turned
         for j in range(seen):
-            covariances[:, j, j] += m.jitter[:, j]
+            covariances[:, j, j] += m.jitter[:, j] + (0.0 if unsure is None else unsure[m.axes[:, j]])
         values, variances_seen = residual[m.axes], camera[m.axes]
         known = np.isfinite(values)
         if known.any():

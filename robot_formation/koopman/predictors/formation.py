@@ -79,8 +79,17 @@ class MixedExperts:
         self._last_turn = 0.0
         self._begun = False
 
-    def observe(self, displacement: Vector, residual: Vector | None, commanded: Vector | None) -> None:
-        """Update with a timestep's total (3,), its residual (3,) and its command (3,), where they are known."""
+    def observe(
+        self,
+        displacement: Vector,
+        residual: Vector | None,
+        commanded: Vector | None,
+        caught_up_rad: float = 0.0,
+    ) -> None:
+        """Update with a timestep's total (3,), its residual (3,) and its command (3,), where they are known.
+
+        `caught_up_rad`: see `Predictor.observe`.
+        """
         if commanded is not None:
             self._bias.observe(displacement, commanded)
         if not self._begun and residual is None:
@@ -101,8 +110,9 @@ class MixedExperts:
             seen[~self._seen] = 0.0
             self._judge(displacement + seen)
         camera = np.where(self._seen, self._camera, _EXACT)
+        unsure = np.array([0.0, 0.0, caught_up_rad**2]) if caught_up_rad else None
         for expert in self.experts.values():
-            expert.observe(displacement, seen, camera)
+            expert.observe(displacement, seen, camera, unsure)
         self._estimate()
         if turn:  # on from the frame at the timestep's start to that at its end
             uv = self.residual[:2]

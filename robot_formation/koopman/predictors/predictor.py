@@ -132,7 +132,14 @@ class Predictor:
         """The predictor's name."""
         return self.parameters.name
 
-    def observe(self, displacement: Vector, residual: Vector | None = None, commanded: Vector | None = None) -> None:
+    def observe(
+        self,
+        displacement: Vector,
+        residual: Vector | None = None,
+        commanded: Vector | None = None,
+        *,
+        caught_up_rad: float = 0.0,
+    ) -> None:
         """Update with a finished timestep: total displacement (3,), camera residual (3,), commanded displacement (3,).
 
         `commanded` is what the total would have been had the prediction move gone as commanded. The residual's turn
@@ -140,9 +147,14 @@ class Predictor:
         before: models go on by their own forecasts and learn nothing. If there never was one, displacements are all
         there is, and models learn from them.
 
+        `caught_up_rad` is the standard deviation of what the displacement's turn makes good of earlier timesteps, whose
+        residuals knew nothing of it. Models without residual feedback take no notice.
+
         Raises:
             PredictionError: if a component is not finite or longer than ten times the bound.
         """
+        if not (math.isfinite(caught_up_rad) and caught_up_rad >= 0.0):
+            raise PredictionError(f"caught_up_rad is {caught_up_rad}; it must be finite and not negative")
         x = self._checked("displacement", displacement)
         r = None if residual is None else self._checked("residual", residual, turn_unknown=True)
         c = None if commanded is None else self._checked("commanded displacement", commanded)
@@ -150,7 +162,7 @@ class Predictor:
         blind = r is None and self._seen
         self._seen = self._seen or r is not None
         if self._closing is not None:
-            self._closing.observe(x, r, c)
+            self._closing.observe(x, r, c, caught_up_rad)
         elif blind:
             self._model.advance()
         else:

@@ -67,6 +67,24 @@ def test_a_check_that_was_called_for_by_turns_finds_no_fault_with_the_forecasts(
     assert checks([0.0] * 8, turn_rad=0.15, found_rad=0.2) == list(range(every, 9, every))
 
 
+def test_half_of_what_a_check_after_turns_finds_counts_as_caught_up_in_its_timestep() -> None:
+    check = HeadingCheck(P)
+    check.stepped(1.1 * P.turned_rad)
+    assert check.due(0.0, KNOWN_RAD)
+    check.done(-0.08)
+    assert check.caught_up_rad == pytest.approx(0.04)
+    check.stepped(0.0)
+    assert check.caught_up_rad == 0.0
+
+
+def test_nothing_is_caught_up_after_a_turn_that_nothing_foretold() -> None:
+    check = HeadingCheck(P)
+    check.stepped(0.0)
+    assert check.due(1.1 * P.beside_sigmas, KNOWN_RAD)
+    check.done(0.2)
+    assert check.caught_up_rad == 0.0
+
+
 def test_a_heading_that_is_hardly_known_is_checked() -> None:
     check = HeadingCheck(P)
     check.stepped(0.0)

@@ -9,7 +9,7 @@ import pytest
 
 from cases import case
 from predictor_helpers import predictor
-from robot_formation.koopman.predictors import Ahead, Predictor, PredictorParameters
+from robot_formation.koopman.predictors import Ahead, PredictionError, Predictor, PredictorParameters
 from robot_formation.koopman.predictors.aggregation import ExponentialWeights, MlPoly
 from robot_formation.koopman.predictors.filter_bank import FilterBank, conditioned
 from robot_formation.koopman.predictors.oscillators import PriorKnowledge, oscillators, periods_of, trends, turning
@@ -223,6 +223,26 @@ def test_a_leader_that_turns_is_forecast_in_the_frame_of_the_follower() -> None:
     way = np.stack([0.005 * np.cos(angles) - 0.05 * np.sin(angles), 0.005 * np.sin(angles) + 0.05 * np.cos(angles)], 1)
     assert found.ahead(5)[4].way[:2] == pytest.approx(way.sum(axis=0), abs=8e-3)
     assert found.ahead(5)[4].way[2] == pytest.approx(0.5, abs=8e-3)
+
+
+@pytest.mark.parametrize("name", ["formation", "previous+close"])
+def test_a_turn_that_makes_good_earlier_ones_changes_the_forecast_less_where_that_is_known(name: str) -> None:
+    found = []
+    for caught_up_rad in (0.0, 0.1):
+        made = predictor(name)
+        for _ in range(15):
+            made.observe(np.array([0.0, 0.05, 0.08]), np.zeros(3))
+        made.observe(np.array([0.0, 0.05, 0.2]), np.zeros(3), caught_up_rad=caught_up_rad)
+        found.append(abs(made.predict().mean[2] - 0.08))
+    assert found[1] < 0.3 * found[0]
+
+
+@pytest.mark.parametrize("wrong", [-0.1, math.nan, math.inf])
+def test_what_a_turn_makes_good_is_a_standard_deviation(wrong: float) -> None:
+    made = predictor("formation")
+    with pytest.raises(PredictionError, match="caught_up_rad"):
+        made.observe(np.array([0.0, 0.05, 0.0]), np.zeros(3), caught_up_rad=wrong)
+    assert made.observations == 0
 
 
 def test_the_aggregation_is_a_choice() -> None:
