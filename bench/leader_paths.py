@@ -350,13 +350,7 @@ def report(args: argparse.Namespace) -> int:
     )
     others = [name for name in predictors if name != OWN]
     print(f"\nRatio of the correction distance of `{OWN}` to that of another predictor, paired over seeds")
-    print_table(
-        ["path", "surface", *others],
-        [
-            [path, surface, *(cell(ratios(found.get(OWN, {}), found.get(name, {})), 1.0, 2) for name in others)]
-            for (path, surface), found in runs.items()
-        ],
-    )
+    print_table(["path", "surface", *others, "best of them"], list(ratio_lines(runs, others)))
     print(
         f"\nBy phase: correction distance [cm] of {' / '.join(COMPARED)}; formation error RMSE [cm]; of `{OWN}`: share"
     )
@@ -366,6 +360,25 @@ def report(args: argparse.Namespace) -> int:
         [[path, surface, *details(found)] for (path, surface), found in runs.items()],
     )
     return 0
+
+
+def ratio_lines(runs: Runs, others: Sequence[str]) -> Iterator[list[str]]:
+    """Yield the lines of the table of ratios: path and surface, and then every path over all of its surfaces."""
+    of_path: dict[str, list[list[list[float]]]] = {}
+    for (path, surface), found in runs.items():
+        best = min(others, key=lambda name: middle_rank(found.get(name, {})))
+        compared = [ratios(found.get(OWN, {}), found.get(name, {})) for name in [*others, best]]
+        of_path.setdefault(path, []).append(compared)
+        yield [path, surface, *(cell(values, 1.0, 2) for values in compared)]
+    for path, surfaces in of_path.items():
+        if len(surfaces) > 1:
+            columns = zip(*surfaces, strict=True)
+            yield [path, "all", *(cell(list(itertools.chain(*column)), 1.0, 2) for column in columns)]
+
+
+def middle_rank(runs: Mapping[int, Row]) -> float:
+    """Median correction distance [m] of a predictor's runs, infinite without any."""
+    return float(np.median([rank(row) for row in runs.values()])) if runs else math.inf
 
 
 def details(found: Mapping[str, Mapping[int, Row]]) -> Iterator[str]:
