@@ -36,8 +36,8 @@ class HeadingCheckParameters:
     )
     beside_sigmas: float = parameter(
         3.0,
-        "Deviation of steps aside from their forecasts, in standard deviations, from which on the heading is checked; "
-        "twice as much after each check that finds no turn",
+        "Sum of the steps' deviations aside from their forecasts, in standard deviations, earlier ones counting less, "
+        "from which on the heading is checked; twice as much after each check that finds no turn",
         low=0.1,
         high=1e6,
     )
@@ -46,7 +46,7 @@ class HeadingCheckParameters:
     )
     doubt_rad: float = parameter(
         0.075,
-        "Standard deviation that the heading is given at the start of a check",
+        "Standard deviation that a check adds to the heading's before it looks",
         unit="rad",
         low=1e-3,
         high=1.0,
@@ -57,8 +57,9 @@ class HeadingCheck:
     """Keeps what calls for a check, from one timestep to the next.
 
     Attributes:
-        caught_up_rad: standard deviation of what the latest timestep's check makes good of earlier timesteps. After an
-            unnoticed turn it is 0: that was made in this timestep, as far as anybody knows.
+        caught_up_rad: standard deviation of what the latest timestep's check makes good of earlier timesteps; 0 where
+            a deviation has called for it, and in follow-ups: what they find was made in that timestep, as far as
+            anybody knows.
     """
 
     def __init__(self, parameters: HeadingCheckParameters) -> None:
@@ -67,7 +68,7 @@ class HeadingCheck:
         self._beside_sigmas = 0.0
         self._patience = 1.0
         self._follow_ups = 0
-        self._beside = False
+        self._beside = self._follow_up = False  # what called for the latest check
         self.caught_up_rad = 0.0
 
     def stepped(self, turn_rad: float) -> None:
@@ -77,7 +78,7 @@ class HeadingCheck:
         self._patience = max(1.0, _PATIENCE_KEPT * self._patience)
 
     def due(self, beside_sigmas: float, sigma_rad: float) -> bool:
-        """Tell after a timestep's first look whether the heading is to be checked.
+        """Process a timestep's first look, and tell whether the heading is to be checked.
 
         Args:
             beside_sigmas: how far aside of its forecast the neighbour's step ended, in standard deviations.
@@ -85,20 +86,21 @@ class HeadingCheck:
         """
         p = self._p
         self._beside_sigmas = _MEMORY * self._beside_sigmas + beside_sigmas
-        self._beside = False
-        if self._follow_ups:
+        self._beside, self._follow_up = False, self._follow_ups > 0
+        if self._follow_up:
             self._follow_ups -= 1
             return True
         self._beside = abs(self._beside_sigmas) > self._patience * p.beside_sigmas
         return self._beside or abs(self._turned_rad) > p.turned_rad or sigma_rad > p.sigma_rad
 
     def done(self, change_rad: float) -> None:
-        """Process a check: by how much it changed the heading."""
+        """Process a check: how far from where it was expected the heading was found."""
         self._turned_rad = self._beside_sigmas = 0.0
+        if self._follow_up:
+            return
         if not self._beside:
             self.caught_up_rad = _CAUGHT_UP * abs(change_rad)
-            return
-        if abs(change_rad) > _FOUND_RAD:
+        elif abs(change_rad) > _FOUND_RAD:
             self._patience, self._follow_ups = 1.0, _FOLLOW_UPS
         else:
             self._patience = min(_MOST_PATIENCE, 2.0 * self._patience)

@@ -123,6 +123,7 @@ class PreciseAlignment:
         self._check = HeadingCheck(parameters.heading_check)
         self._stepped = False  # the neighbour, and no look since then
         self._expected_rad: float | None = None  # the heading, while it is checked
+        self._doubted = False  # whether the check has begun to move
         self._formation = Motion(y_m=-formation_distance_m)  # position in the neighbour's frame
         self._moves = 0
         self._timestep = 0
@@ -186,32 +187,58 @@ class PreciseAlignment:
         if strange and self._search.looks >= self._p.search.hold_looks and self._filter.whole(boxes):
             # What doesn't fit for so long is not in the way: the neighbour, or the follower, was moved.
             self._filter.forget()
-            strange = False
+            self._expected_rad = self._way = None
+            self._stepped = strange = False
         if not boxes or strange:
+            if self._expected_rad is not None and self._viewpoints:
+                self._viewpoints.pop(0)  # nothing to be seen from there
             offset = self.offset()
             decision = self._search.missed(self._last if self._moves else Motion(), offset.mean if offset else None)
             self._moves += count_legs(decision.motion)
             return decision
         self._search.found()
         first = not self._filter.known
+        expected_rad = 0.0 if first else float(self._filter.best.state[YAW])
         self._filter.look(boxes)
-        self._check_heading(boxes)
+        if not first:
+            self._check_heading(boxes, expected_rad)
         self._way = self.offset()
         if first and set(boxes) == {Face.TARGET} and self._placed(self._filter.best.state):
             self._filter.assume_heading(self._p.placed_heading_rad)
             self._viewpoints = []
         return self._correct()
 
-    def _check_heading(self, boxes: dict[Face, FaceBox]) -> None:
-        """Begin or end a check of the heading by what the latest look shows."""
-        heading_rad = float(self._filter.best.state[YAW])
-        if self._expected_rad is not None:
-            if len(boxes) > 1 and min(box.width for box in boxes.values()) >= _SECOND_FACE_PX:
-                self._viewpoints = []
-        elif self._stepped and self._check.due(self._beside_sigmas(), self._filter.yaw_sigma_rad):
-            self._filter.doubt_heading(self._p.heading_check.doubt_rad)
-            self._expected_rad, self._viewpoints = heading_rad, None
+    def _check_heading(self, boxes: dict[Face, FaceBox], expected_rad: float) -> None:
+        """Begin or end a check of the heading by what the latest look shows.
+
+        Args:
+            boxes: the look.
+            expected_rad: the heading that was expected of it.
+        """
+        if self._stepped and self._check.due(self._beside_sigmas(), self._filter.yaw_sigma_rad):
+            self._expected_rad, self._viewpoints, self._doubted = expected_rad, None, False
         self._stepped = False
+        two_faces = len(boxes) > 1 and min(box.width for box in boxes.values()) >= _SECOND_FACE_PX
+        if self._expected_rad is not None and two_faces:
+            self._end_check()
+
+    def _end_check(self) -> None:
+        if self._expected_rad is not None:
+            self._check.done(float(self._filter.best.state[YAW]) - self._expected_rad)
+        self._expected_rad, self._viewpoints = None, []
+
+    def _to_check(self, state: Vector) -> tuple[Motion, str]:
+        """Choose the next motion of a check; none where it has ended, or can't be made."""
+        motion, reason = self._to_see_more(state)
+        if motion != Motion():
+            if not self._doubted:
+                self._filter.doubt_heading(self._p.heading_check.doubt_rad)
+            self._doubted = True
+        elif self._doubted and not self._viewpoints:
+            self._end_check()  # no second face from anywhere: so the heading is about as expected
+        else:
+            self._expected_rad, self._viewpoints = None, []  # still called for in the next timestep
+        return motion, reason
 
     def _beside_sigmas(self) -> float:
         """Return how far aside of its forecast the neighbour's step ended, in standard deviations."""
@@ -225,11 +252,10 @@ class PreciseAlignment:
         p, state = self._p, self._filter.best.state
         unsure = self._filter.yaw_sigma_rad > p.certain_rad
         motion, reason = Motion(), ""
-        if self._viewpoints != [] and (self._expected_rad is not None or (unsure and self._timestep == 0)):
+        if self._expected_rad is not None:
+            motion, reason = self._to_check(state)
+        elif unsure and self._timestep == 0 and self._viewpoints != []:
             motion, reason = self._to_see_more(state)
-        if self._expected_rad is not None and self._viewpoints == []:
-            self._check.done(float(state[YAW]) - self._expected_rad)
-            self._expected_rad = None
         if motion == Motion():
             if self._within(pose_of(state).then(self._formation)):
                 return Decision(Verdict.ALIGNED, reason="inside the tolerances")
@@ -270,7 +296,8 @@ class PreciseAlignment:
         states = self._filter.likely()
         if not self._planner.apart(state) and (away := self._planner.away(states)) != Motion():
             return away, "too close: away along u"
-        if self._filter.yaw_sigma_rad > _UNKNOWN_HEADING_RAD and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
+        unknown = self._filter.yaw_sigma_rad > _UNKNOWN_HEADING_RAD and self._expected_rad is None
+        if unknown and abs(math.atan2(state[X], state[Y])) > _ASIDE_RAD:
             return self._planner.face(states), "turn towards the marker"
         return Motion(), ""
 

@@ -77,6 +77,15 @@ def test_half_of_what_a_check_after_turns_finds_counts_as_caught_up_in_its_times
     assert check.caught_up_rad == 0.0
 
 
+def test_nothing_is_caught_up_in_follow_ups() -> None:
+    check = HeadingCheck(P)
+    for beside, found_rad in ((1.1 * P.beside_sigmas, 0.2), (0.0, 0.08), (0.0, 0.08)):
+        check.stepped(0.0)
+        assert check.due(beside, KNOWN_RAD)
+        check.done(found_rad)
+        assert check.caught_up_rad == 0.0
+
+
 def test_nothing_is_caught_up_after_a_turn_that_nothing_foretold() -> None:
     check = HeadingCheck(P)
     check.stepped(0.0)
