@@ -22,8 +22,8 @@ SURE = np.diag([0.001**2, 0.001**2, 0.01**2])
 class Pair:
     """A follower that makes what is decided, exactly, and its neighbour."""
 
-    def __init__(self, camera: Camera = blocks_of, parameters: PreciseParameters = PreciseParameters()) -> None:
-        self.alignment = PreciseAlignment(parameters, FORMATION_DISTANCE_M)
+    def __init__(self, camera: Camera = blocks_of, max_moves: int = PreciseParameters.max_moves) -> None:
+        self.alignment = PreciseAlignment(PreciseParameters(max_moves=max_moves), FORMATION_DISTANCE_M)
         self.timestep = 1
         self.camera = camera
         self.truth = state_of()
@@ -94,7 +94,7 @@ def test_a_check_that_sees_the_neighbour_from_nowhere_else_ends_in_formation() -
 
 
 def test_a_check_that_takes_more_moves_than_there_are_is_left_out() -> None:
-    pair = Pair(parameters=PreciseParameters(max_moves=1))
+    pair = Pair(max_moves=1)
     turn = math.radians(8.0)
     for _ in range(4):
         decisions = pair.step(Motion(0.05, 0.0035, turn), Motion(0.05, 0.0035, turn))
