@@ -42,7 +42,7 @@ class HeadingCheckParameters:
         high=1e6,
     )
     sigma_rad: float = parameter(
-        0.05, "Standard deviation of the heading from which on it is checked", unit="rad", low=1e-3, high=1000.0
+        0.2, "Standard deviation of the heading from which on it is checked", unit="rad", low=1e-3, high=1000.0
     )
     doubt_rad: float = parameter(
         0.075,
