@@ -102,7 +102,7 @@ class FilterParameters:
         high=1.0,
     )
     calm_nis: float = parameter(
-        0.12,
+        0.025,
         "Mean NIS of the first look after a step up to which the noise of the step model is not inflated",
         low=1e-4,
         high=100.0,
