@@ -45,10 +45,10 @@ from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.sweep import CONDITIONS
-from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import Ahead, Predictor
 from robot_formation.names import Message
+from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 
 TIMESTEPS = 60
 PATHS: dict[str, tuple[str, ...]] = {

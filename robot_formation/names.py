@@ -87,6 +87,11 @@ def beacon_neighbour(robot: str) -> str:
     return LEADER if number == "1" else follower(int(number) - 1)
 
 
+def right_neighbour(robot: str) -> str:
+    """Return the name of the follower on a robot's right, whether there is one or not."""
+    return follower(1 if robot == LEADER else int(robot.removeprefix("follower_")) + 1)
+
+
 def under(prefix: str, name: str) -> str:
     """Join a robot's name (may be empty: the node's own namespace) and a topic."""
     return f"{prefix}/{name}" if prefix else name
@@ -155,6 +160,16 @@ def overhead_path(robot: str) -> Topic:
 def formation_done(robot: str, formation: str = FORMATION, *, listeners: tuple[str, ...] = ("fine_tuner",)) -> Topic:
     """The bare tick of a robot: the number of the timestep that it has finished."""
     return Topic(f"{formation}/{robot}/done", "std_msgs/msg/UInt32", HISTORY, listeners)
+
+
+def formation_begun(robot: str, formation: str = FORMATION, *, listeners: tuple[str, ...] = ("world",)) -> Topic:
+    """The bare tick of a robot in the schedule `together`: the number of the timestep that it begins."""
+    return Topic(f"{formation}/{robot}/begun", "std_msgs/msg/UInt32", HISTORY, listeners)
+
+
+def formation_clock(formation: str = FORMATION) -> Topic:
+    """The world's clock, beside the formation's namespace, for the schedule `timer`."""
+    return Topic(f"{formation.rpartition('/')[0]}/clock", "rosgraph_msgs/msg/Clock", CLOCK)
 
 
 SURFACE = Topic("surface", "visualization_msgs/msg/Marker", LATCHED)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
 from robot_formation.analysis.quantities import Corrections, FollowerAnalysis, RunAnalysis
 from robot_formation.analysis.run_record import Ground, RunRecord, Track
-from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.names import LEADER
+from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -34,14 +34,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.analysis.chain import chain_totals, pose, pose_at_end
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.moves import Moves, is_blind, move_totals, movements_of, moves_of
 from robot_formation.analysis.quantiles import ELLIPSE_90, NORMAL_90
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
-from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
+from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.json_values import JsonObject
 from robot_formation.names import beacon_neighbour
+from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 
 
 @dataclass(frozen=True)
@@ -169,6 +171,7 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
     values["formation_error_blind_max_m"] = max(
         (t.formation_error_m for t in timesteps if t.blind and t.formation_error_m is not None), default=None
     )
+    values.update(chain_totals(record, follower, [t.formation_error_m for t in timesteps]))
     values["timesteps_finished"] = finished
     values["timesteps_planned"] = record.timesteps_planned
     values["unfinished_timestep"] = None
@@ -265,7 +268,7 @@ def _timestep(record: RunRecord, follower: FollowerRecord, t: int) -> Timestep:
     displacement = follower.displacements[t - 1]
     left = follower.residuals[t - 1] if t <= len(follower.residuals) else None
     forecast = follower.predictions[t - 2] if 2 <= t <= len(follower.predictions) + 1 else None
-    error_uv, heading_error = _ground_truth(record, follower.name, displacement.stamp_ns)
+    error_uv, heading_error = _ground_truth(record, follower, t)
     indices = _moves(record, follower, t)
     return Timestep(
         t=t,
@@ -283,18 +286,30 @@ def _timestep(record: RunRecord, follower: FollowerRecord, t: int) -> Timestep:
 
 
 def _moves(record: RunRecord, follower: FollowerRecord, t: int) -> list[int]:
-    """Find the moves of timestep t: from the leader's t-th move to the t-th displacement, if that exists."""
-    start_ns = record.leader_moved[t - 1].stamp_ns
+    """Find the moves of timestep t: from the displacement before to the t-th, if that exists."""
+    start_ns = follower.displacements[t - 2].stamp_ns if t > 1 else _first_begun_ns(record, follower)
     end_ns = follower.displacements[t - 1].stamp_ns if t <= len(follower.displacements) else math.inf
     return [index for index, move in enumerate(follower.moved) if start_ns < move.stamp_ns <= end_ns]
 
 
-def _ground_truth(record: RunRecord, robot: str, stamp_ns: int) -> tuple[tuple[float, float] | None, float | None]:
-    """Return the formation error (u, v) in metres and the heading error in radians at a stamp, where they are known."""
-    own = record.tracks.get(robot)
-    other = record.tracks.get(beacon_neighbour(robot))
+def _first_begun_ns(record: RunRecord, follower: FollowerRecord) -> int:
+    """Return when a follower's first timestep began: when it said so, else with the end of the leader's first move."""
+    for text, stamp_ns in zip(follower.states, follower.state_stamps_ns, strict=False):
+        state = AlignmentState.parse(text)
+        if state is not None and state.opens_timestep:
+            return min(stamp_ns, record.leader_moved[0].stamp_ns)
+    return record.leader_moved[0].stamp_ns
+
+
+def _ground_truth(
+    record: RunRecord, follower: FollowerRecord, t: int
+) -> tuple[tuple[float, float] | None, float | None]:
+    """Return the formation error (u, v) in metres and the heading error in radians of timestep t, where known."""
+    neighbour = beacon_neighbour(follower.name)
+    stamp_ns = follower.displacements[t - 1].stamp_ns
+    own = record.tracks.get(follower.name)
     pose_f = own.at(stamp_ns) if own else None
-    pose_b = other.at(stamp_ns) if other else None
+    pose_b = pose_at_end(record, neighbour, t - 1) if record.delayed else pose(record, neighbour, stamp_ns)
     if pose_f is None or pose_b is None:
         return None, None
     heading_error = math.remainder(pose_f.yaw_rad - pose_b.yaw_rad, math.tau)

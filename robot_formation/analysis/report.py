@@ -13,9 +13,9 @@ from robot_formation.analysis.figures import draw_corrections, draw_trajectory
 from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, Timestep
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.bag.folder import bag_name
-from robot_formation.follower.fine_tuning import COLLECTION_TIMESTEPS
 from robot_formation.geometry.se2 import Motion
 from robot_formation.json_values import JsonObject
+from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 
 _HEADERS = (
     ("", "predicted", "moved", "correction", "residual", "moves", "formation", "heading"),

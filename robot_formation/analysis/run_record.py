@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from robot_formation.bag.run_details import node_parameters, whole_number
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.schedule.schedules import Spacing
 
 DOT_HEIGHT_M = 0.216
 """Height of the reference dot above base_link (paper: the robot's height)."""
@@ -166,3 +167,9 @@ class RunRecord:
         except (KeyError, ValueError, TypeError, OverflowError):
             return FORMATION_DISTANCE_M
         return said if math.isfinite(said) else FORMATION_DISTANCE_M
+
+    @property
+    def delayed(self) -> bool:
+        """Whether followers keep their places beside where their neighbours stood one timestep earlier."""
+        fine_tuner = node_parameters(self.details).get("fine_tuner", {})
+        return fine_tuner.get("spacing") == Spacing.DELAYED.value

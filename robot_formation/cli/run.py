@@ -46,6 +46,9 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--path", metavar="NAME", help="the leader's path: straight, circle, ... (see 'formation list')"
     )
+    parser.add_argument(
+        "--schedule", metavar="NAME", help="who waits for whom: turns (default, the paper's), wave, together or timer"
+    )
     parser.add_argument("--surface", metavar="NAME", help="bowl, plane, ... (see 'formation list')")
     parser.add_argument(
         "--set",
@@ -128,6 +131,7 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
         ("--path", "leader.path", args.path),
         ("--predictor", "predictor.name", args.predictor),
         ("--seed", "seed", args.seed),
+        ("--schedule", "schedule", args.schedule),
         ("--camera", "world.camera.mode", args.camera),
         ("--real-time-factor", "world.real_time_factor", args.real_time_factor),
     ):

@@ -14,6 +14,24 @@ from robot_formation.follower.camera_calibration_file import calibrated
 from robot_formation.geometry.se2 import Motion
 from robot_formation.geometry.uncertain_motion import EXACT, UncertainMotion
 from robot_formation.names import Message
+from robot_formation.schedule.schedules import Schedule
+from robot_formation.schedule.start_rule import StartRule
+
+
+def done_listeners(schedule: Schedule, robots: int, *, first: bool) -> tuple[str, ...]:
+    """Return the names of the nodes that have to hear a follower's tick.
+
+    Args:
+        schedule: who waits for whom.
+        robots: 1 if no robot stands on the follower's right, else 2.
+        first: whether the robot on its left is the leader.
+    """
+    if schedule is Schedule.TURNS:
+        return ("leader", "fine_tuner")[:robots]
+    if schedule is Schedule.TOGETHER:
+        return ("leader" if first else "fine_tuner",)
+    hearers = ["leader"] if first else ["fine_tuner"]
+    return tuple(dict.fromkeys([*hearers, *["fine_tuner"][: robots - 1], "world"]))
 
 
 class FineTunerComponent(Component):
@@ -21,11 +39,25 @@ class FineTunerComponent(Component):
 
     def __init__(self, parameters: FineTunerNodeParameters, place: Place) -> None:
         super().__init__(place)
-        self._tuner = core.FineTuner(calibrated(parameters))
+        self._schedule = parameters.schedule
+        self._last = parameters.done_listeners == 1
+        self._rule = StartRule(
+            parameters.schedule,
+            parameters.spacing,
+            last=self._last,
+            period_s=parameters.period_s,
+            timesteps=parameters.timesteps,
+        )
+        self._tuner = core.FineTuner(calibrated(parameters), self._rule)
         self.patience_s = parameters.look.patience_s
-        self._neighbour = names.formation_done(names.beacon_neighbour(place.robot), place.formation)
-        listeners = ("leader", "fine_tuner")[: parameters.done_listeners]
+        self._timesteps = parameters.timesteps
+        self._left = names.beacon_neighbour(place.robot)
+        listeners = done_listeners(parameters.schedule, parameters.done_listeners, first=self._left == names.LEADER)
         self._done = names.formation_done(place.robot, place.formation, listeners=listeners)
+        following = ("world",) if self._last else ("fine_tuner", "world")
+        self._begun = names.formation_begun(place.robot, place.formation, listeners=following)
+        self._told_begun, self._passed_on = 0, -1
+        self._finished = -1
         self._base = place.frame(names.BASE_FRAME)
         self._answers: dict[int, dict[names.Topic, Message]] = {}  # the predictor's, by stamp
         self._first_forecast_ns: int | None = None
@@ -33,15 +65,32 @@ class FineTunerComponent(Component):
     def inputs(self) -> list[Input]:
         """See `Component`."""
         return [
-            Input(self._neighbour, self._on_neighbour_done),
+            *self._ticks(),
             Input(names.PREDICTION, partial(self._on_answer, names.PREDICTION)),
             Input(names.FORECAST, partial(self._on_answer, names.FORECAST)),
             Input(names.BLOCKS, self._on_blocks),
             Input(names.MOVED, self._on_moved),
         ]
 
+    def _ticks(self) -> list[Input]:
+        """List what it hears of other robots, or of time: never more than bare ticks of its neighbours."""
+        if self._schedule is Schedule.TIMER:
+            return [Input(names.formation_clock(self.place.formation), self._on_clock)]
+        left = names.formation_begun if self._schedule is Schedule.TOGETHER else names.formation_done
+        heard = [Input(left(self._left, self.place.formation), self._on_left)]
+        if self._schedule is not Schedule.TURNS and not self._last:
+            right = names.formation_done(names.right_neighbour(self.place.robot), self.place.formation)
+            heard.append(Input(right, self._on_right))
+        return heard
+
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
+        ticks = {
+            Schedule.TURNS: [self._done],
+            Schedule.WAVE: [self._done],
+            Schedule.TOGETHER: [self._done, self._begun],
+            Schedule.TIMER: [],
+        }[self._schedule]
         return [
             names.MOVE,
             names.camera_request(),
@@ -49,8 +98,18 @@ class FineTunerComponent(Component):
             names.DISPLACEMENT,
             names.RESIDUAL,
             names.ALIGNMENT,
-            self._done,
+            *ticks,
         ]
+
+    def start(self) -> None:
+        """See `Component`: by the clock the first alignment begins at once."""
+        if self._schedule is Schedule.TIMER:
+            self._act(self._tuner.heard())
+
+    @property
+    def _begins(self) -> int:
+        """The latest timestep after the first alignment that has begun; 0: none."""
+        return self._tuner.timestep - (self._tuner.phase is core.Phase.NEIGHBOUR)
 
     def stalled(self) -> None:
         """See `Component`: frames that don't come are asked for again, up to a bound."""
@@ -60,8 +119,17 @@ class FineTunerComponent(Component):
         """See `Component`."""
         return {"timestep": str(self._tuner.timestep), "waiting for": self._tuner.phase.name.lower()}
 
-    def _on_neighbour_done(self, message: Message) -> None:
+    def _on_left(self, message: Message) -> None:
         self._act(self._tuner.neighbour_done(int(message.data)))
+
+    def _on_right(self, message: Message) -> None:
+        self._rule.right = max(self._rule.right, int(message.data))
+        self._act(self._tuner.heard())
+        self._pass_on()
+
+    def _on_clock(self, message: Message) -> None:
+        self._rule.now_ns = conversions.read_clock(message)
+        self._act(self._tuner.heard())
 
     def _on_answer(self, topic: names.Topic, message: Message) -> None:
         """Take the predictor's answer once both of its messages are here, in whatever order they came.
@@ -96,8 +164,37 @@ class FineTunerComponent(Component):
             return
         self._act(self._tuner.frame(blocks, conversions.stamp_of(message)))
 
+    def _finish(self, timestep: int) -> None:
+        """Tell that a timestep is finished, to whom it concerns."""
+        self._finished = timestep
+        if self._schedule in (Schedule.TURNS, Schedule.WAVE):
+            self._send(self._done, conversions.uint32(timestep))
+        else:
+            self._send(names.camera_request(), conversions.uint32(0))  # the world need not wait any more
+        if self._schedule is Schedule.TOGETHER and timestep == 0:
+            self._send(self._begun, conversions.uint32(0))  # the first alignment goes along the chain
+        self._pass_on()
+
+    def _pass_on(self) -> None:
+        """Pass on what all robots behind have finished.
+
+        In `together` a timestep's tick waits for theirs. In `wave` the last timestep's is followed by one more then,
+        which ends the tour.
+        """
+        behind = self._finished if self._last else min(self._finished, self._rule.right)
+        if self._schedule is Schedule.WAVE:
+            ended = self._finished == self._timesteps and (self._last or self._rule.right > self._timesteps)
+            behind = self._timesteps + 1 if ended else -1
+        if behind <= self._passed_on or self._schedule in (Schedule.TURNS, Schedule.TIMER):
+            return
+        self._passed_on = behind
+        self._send(self._done, conversions.uint32(behind))
+
     def _act(self, actions: Sequence[core.Action]) -> None:
         self.stamp_ns = self._tuner.stamp_ns
+        if self._schedule is Schedule.TOGETHER and self._begins > self._told_begun:
+            self._told_begun = self._begins
+            self._send(self._begun, conversions.uint32(self._begins))
         for action in actions:
             match action:
                 case core.SendMove(motion):
@@ -107,7 +204,7 @@ class FineTunerComponent(Component):
                 case core.Report():
                     self._report(action)
                 case core.Done(timestep):
-                    self._send(self._done, conversions.uint32(timestep))
+                    self._finish(timestep)
                 case State():
                     self._send(names.ALIGNMENT, conversions.string(action.text))
                 case core.Warn(text):

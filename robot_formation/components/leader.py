@@ -13,6 +13,7 @@ from robot_formation.leader.driven_steps import DrivenSteps, Velocity
 from robot_formation.leader.leader_motion import Leader, LeaderAction, LeaderParameters
 from robot_formation.leader.paths import Teleop, poses
 from robot_formation.names import Message
+from robot_formation.schedule.schedules import Schedule
 
 MOST_PLANNED = 2000
 """Poses of a plan; of a longer one every second, third, ... is published."""
@@ -26,17 +27,21 @@ class LeaderComponent(Component):
         path = parameters.make_path()
         self._driven = DrivenSteps(path) if isinstance(path, Teleop) else None
         self._leader = Leader(parameters, self._driven_motion if self._driven else None)
-        self._followers = parameters.followers
+        self._schedule = parameters.schedule
         self._timesteps = parameters.timesteps
-        self._done = names.formation_done(place.robot, place.formation)
+        listeners = {Schedule.WAVE: ("fine_tuner", "world"), Schedule.TOGETHER: ()}.get(self._schedule, ("fine_tuner",))
+        self._done = names.formation_done(place.robot, place.formation, listeners=listeners)
+        self._begun = names.formation_begun(place.robot, place.formation, listeners=("fine_tuner", "world"))
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
         found = [Input(names.MOVED, self._on_moved)]
         found += [
             Input(names.formation_done(name, self.place.formation), partial(self._on_done, name))
-            for name in self._followers
+            for name in self._leader.heard
         ]
+        if self._schedule is Schedule.TIMER:
+            found.append(Input(names.formation_clock(self.place.formation), self._on_clock))
         if self._driven:
             found.append(Input(names.CMD_VEL, lambda message: self._on_velocity(message.twist)))
             found.append(Input(names.CMD_VEL_UNSTAMPED, self._on_velocity))
@@ -44,7 +49,8 @@ class LeaderComponent(Component):
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
-        return [names.MOVE, self._done, *([] if self._driven else [names.PLAN])]
+        ticks = {Schedule.TIMER: [], Schedule.TOGETHER: [self._done, self._begun]}.get(self._schedule, [self._done])
+        return [names.MOVE, *ticks, *([] if self._driven else [names.PLAN])]
 
     def services(self) -> dict[str, Callable[[], tuple[bool, str]]]:
         """See `Component`."""
@@ -95,6 +101,9 @@ class LeaderComponent(Component):
     def _on_done(self, follower: str, message: Message) -> None:
         self._act(self._leader.follower_done(follower, int(message.data)))
 
+    def _on_clock(self, message: Message) -> None:
+        self._act(self._leader.clock(conversions.read_clock(message)))
+
     def _on_start(self) -> tuple[bool, str]:
         self._act(self._leader.resume())
         return True, f"going on with timestep {self._leader.timestep}"
@@ -104,9 +113,11 @@ class LeaderComponent(Component):
         return True, f"no new timestep after {self._leader.timestep}; call leader/start to go on"
 
     def _act(self, action: LeaderAction) -> None:
+        if self._schedule is Schedule.TOGETHER and (action.move is not None or action.done == 0):
+            self._send(self._begun, conversions.uint32(self._leader.timestep))
         if action.move is not None:
             self._send(names.MOVE, conversions.move(action.move, self.place.frame(names.BASE_FRAME), self.stamp_ns))
-        if action.done is not None:
+        if action.done is not None and self._schedule is not Schedule.TIMER:
             self._send(self._done, conversions.uint32(action.done))
         if action.finished:
             self.finish(0, f"all {self._leader.timestep} timesteps driven")

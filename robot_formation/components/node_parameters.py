@@ -9,6 +9,7 @@ from robot_formation import names
 from robot_formation.follower.fine_tuning import FineTunerParameters
 from robot_formation.parameters import ParameterError, parameter
 from robot_formation.paths import config_dir
+from robot_formation.schedule.schedules import Schedule, Spacing, check_spacing, period_parameter
 from robot_formation.surface import SURFACES, Surface, surface_from_texts
 from robot_formation.vision.aruco_detector import TagParameters
 from robot_formation.vision.marker import MarkerKind
@@ -37,6 +38,11 @@ class WorldNodeParameters(WorldParameters):
     leaving_ends_run: bool = parameter(
         True, "End with exit code 3 when a robot's reference dot leaves the plate; false: only hold the robot there"
     )
+    schedule: Schedule = parameter(
+        Schedule.TURNS, "Who waits for whom: in all but turns the world hears ticks, to know whose orders are to come"
+    )
+    timesteps: int = parameter(20, "Timesteps of the run, for schedules other than turns", low=1, high=100000)
+    period_s: float = period_parameter()
 
     def __post_init__(self) -> None:
         """Check that every robot has a start."""
@@ -124,9 +130,21 @@ class BlockDetectorNodeParameters(DetectorParameters):
 class FineTunerNodeParameters(FineTunerParameters):
     """The fine-tuner's parameters and who listens to its tick."""
 
+    schedule: Schedule = parameter(Schedule.TURNS, "Who waits for whom before a timestep begins")
+    spacing: Spacing = parameter(
+        Spacing.RIGID,
+        "What the place is; delayed: where it was one timestep earlier, with a schedule of moves at the same time",
+    )
+    period_s: float = period_parameter()
+    timesteps: int = parameter(20, "Timesteps of the run, for the schedule wave", low=1, high=100000)
     done_listeners: int = parameter(
         1,
         "Nodes that wait for this follower's tick: the leader, and the follower behind if there is one",
         low=0,
         high=2,
     )
+
+    def __post_init__(self) -> None:
+        """Check that the spacing fits the schedule."""
+        super().__post_init__()
+        check_spacing(self.schedule, self.spacing)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import ClassVar
 
@@ -10,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation import conversions, exit_codes, names
+from robot_formation.components.awaited_robots import AwaitedRobots
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.components.overhead_view import OverheadView
 from robot_formation.components.trail import Trail
 from robot_formation.errors import FormationError
 from robot_formation.names import Message
+from robot_formation.schedule.schedules import Schedule
 from robot_formation.surface import Surface
 from robot_formation.world.description import robot_description
 from robot_formation.world.events import Event, Frame, JointStates, LeftPlate, RobotPose
@@ -38,6 +41,8 @@ class WorldComponent(Component):
         self._paused = False
         self._cameras = [start.name for start in parameters.starts() if start.camera]
         # Topics are made once: a run sends thousands of messages.
+        waiting = ("leader", "fine_tuner") if parameters.schedule is Schedule.TIMER else ()
+        self._clock = replace(names.CLOCK_TOPIC, listeners=waiting)
         self._joint_states = {name: names.joint_states(name) for name in parameters.robots}
         self._images = {name: names.camera_image(name) for name in self._cameras}
         self._odom = {name: names.ground_truth_odom(name) for name in parameters.robots}
@@ -53,6 +58,14 @@ class WorldComponent(Component):
         self._trails: dict[str, Trail[Message]] = {name: Trail() for name in parameters.robots}
         self._overhead = OverheadView(surface, parameters, parameters.seed)
         self.stamp_ns = start_ns
+        self._awaited = AwaitedRobots(parameters.schedule, parameters.robots, parameters.timesteps, parameters.period_s)
+        self._owe_period()
+
+    def _owe_period(self) -> None:
+        """With `timer`, let time go on to the beginning of the next timestep."""
+        end_ns = self._awaited.period_end_ns
+        if end_ns is not None:
+            self._world.owe_time(end_ns)
 
     def inputs(self) -> list[Input]:
         """See `Component`."""
@@ -60,11 +73,28 @@ class WorldComponent(Component):
             Input(names.joint_commands(name), partial(self._on_command, name)) for name in self._parameters.robots
         ]
         requests = [Input(names.camera_request(name), partial(self._on_request, name)) for name in self._cameras]
-        return commands + requests
+        return [*commands, *requests, *self._ticks()]
+
+    def _ticks(self) -> list[Input]:
+        """Ticks by which it knows whom it has to wait for."""
+        topic = {Schedule.WAVE: names.formation_done, Schedule.TOGETHER: names.formation_begun}.get(
+            self._parameters.schedule
+        )
+        if topic is None:
+            return []
+        heard = self._parameters.robots
+        return [Input(topic(name, self.place.formation), partial(self._on_tick, name)) for name in heard]
+
+    def _on_tick(self, robot: str, message: Message) -> None:
+        timestep = int(message.data)
+        if self._parameters.schedule is Schedule.WAVE:
+            self._awaited.finished(robot, timestep)
+        else:
+            self._awaited.begun(robot, timestep)
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
-        topics = [names.CLOCK_TOPIC, names.SURFACE, names.left_plate(), *self._overhead.topics()]
+        topics = [self._clock, names.SURFACE, names.left_plate(), *self._overhead.topics()]
         for name in self._parameters.robots:
             topics += [
                 self._joint_states[name],
@@ -97,7 +127,7 @@ class WorldComponent(Component):
             text = robot_description(name, self._parameters, camera=name in self._cameras)
             self._send(names.robot_description(name), conversions.string(text))
         self._overhead.announce(self._send, now)
-        self._send(names.CLOCK_TOPIC, conversions.clock(now))
+        self._send(self._clock, conversions.clock(now))
         for name in self._parameters.robots:
             self._publish(RobotPose(name, now, self._world.ground_truth(name), final=True))
         self._overhead.look(self._world, self._send)
@@ -105,15 +135,19 @@ class WorldComponent(Component):
     @property
     def busy(self) -> bool:
         """See `Component`."""
-        return self._world.owes and not self._paused
+        return self._world.owes and not self._paused and not self._awaited.any
 
     def work(self) -> None:
         """See `Component`: advances to the next instant that has something to publish."""
         self._tell(self._world.advance())
+        end_ns = self._awaited.period_end_ns
+        if end_ns is not None and self._world.stamp_ns - self._world.start_ns >= end_ns:
+            self._awaited.period_ended()
+            self._owe_period()
 
     def _tell(self, events: list[Event]) -> None:
         self.stamp_ns = self._world.stamp_ns
-        self._send(names.CLOCK_TOPIC, conversions.clock(self.stamp_ns))
+        self._send(self._clock, conversions.clock(self.stamp_ns))
         for event in events:
             self._publish(event)
         self._overhead.after(events, self._world, self._send)
@@ -128,6 +162,7 @@ class WorldComponent(Component):
             "simulated time [s]": f"{self._world.stamp_ns / 1e9:.3f}",
             "owes": str(self._world.owes),
             "paused": str(self._paused),
+            "waits for": ", ".join(self._awaited.names()),
         }
 
     def services(self) -> dict[str, Callable[[], tuple[bool, str]]]:
@@ -188,18 +223,26 @@ class WorldComponent(Component):
                 return  # a robot that takes no commands at all any more
         self._numbers[robot] = message.header.frame_id
         self._moving.add(robot)
+        self._awaited.ordered(robot)
 
     def _on_request(self, robot: str, message: Message) -> None:
+        count = int(message.data)
+        if count == 0 and self._parameters.schedule is not Schedule.TURNS:
+            self._awaited.idle(robot)
+            return
         try:
-            self._world.request_frames(robot, int(message.data))
+            self._world.request_frames(robot, count)
         except ValueError as error:
             self.warn(f"{robot}: {error}")
+            return
+        self._awaited.ordered(robot, frames=True)
 
     def _publish(self, event: Event) -> None:
         match event:
             case JointStates():
                 if event.final:
                     self._moving.discard(event.robot)
+                    self._awaited.rests(event.robot)
                 if event.timed_out and event.final:
                     self.warn(f"{event.robot}: a motion took too long and was braked; is the robot blocked?")
                 message = conversions.joint_states(
@@ -209,6 +252,8 @@ class WorldComponent(Component):
             case Frame():
                 frame = f"{event.robot}/{names.OPTICAL_FRAME}"
                 self._send(self._images[event.robot], conversions.image(event.image, frame, event.stamp_ns))
+                if not self._world.frames_owed(event.robot):
+                    self._awaited.looked(event.robot)
             case RobotPose():
                 self._publish_truth(event)
             case LeftPlate():

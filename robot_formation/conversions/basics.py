@@ -65,6 +65,11 @@ def clock(stamp_ns: int) -> Clock:
     return Clock(clock=to_time(stamp_ns))
 
 
+def read_clock(message: Clock) -> int:
+    """Return a /clock message's time, nanoseconds."""
+    return int(message.clock.sec) * 10**9 + int(message.clock.nanosec)
+
+
 def uint32(value: int) -> UInt32:
     """Make a tick or a count."""
     return UInt32(data=value)

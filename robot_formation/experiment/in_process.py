@@ -25,6 +25,7 @@ from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import IMAGE_TYPE, Message, Topic, absolute
+from robot_formation.schedule.schedules import Spacing
 
 P = TypeVar("P")
 
@@ -140,6 +141,7 @@ def run_in_process(
         say,
         lambda: time.monotonic() - began,
         scenario.fine_tuner.formation_distance_m,
+        delayed=scenario.setup.spacing is Spacing.DELAYED,
     )
     run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
     with contextlib.ExitStack() as stack:

@@ -36,10 +36,20 @@ class _Heard:
             bisect_right(self.moves, after_ns, key=_stamp) : bisect_right(self.moves, until_ns, key=_stamp)
         ]
 
-    def timestep_moves(self, timestep: int, after_ns: int) -> list[Motion] | None:
-        """List the moves of a finished timestep, counted from 1, that began after a stamp; None until all are there."""
+    def timestep_moves(self, timestep: int, leader_ns: int) -> list[Motion] | None:
+        """List the moves of a finished timestep, counted from 1; None until all are there.
+
+        The first timestep's are those after the leader's first move has ended; or, where robots move at the same time,
+        the last ones that sum up to the displacement.
+        """
         if len(self.timesteps) < timestep:
             return None
+        if timestep > 1:
+            return self._moves_after(timestep, self.timesteps[timestep - 2][0])
+        ends = [leader_ns, *(end for end, _ in reversed(self.moves_between(-1, self.timesteps[0][0] - 1))), -1]
+        return next((moves for end in ends if (moves := self._moves_after(1, end)) is not None), None)
+
+    def _moves_after(self, timestep: int, after_ns: int) -> list[Motion] | None:
         until_ns, displacement = self.timesteps[timestep - 1]
         # The fine-tuner counts no move whose displacement the drive couldn't measure.
         moves = [move for _, move in self.moves_between(after_ns, until_ns) if move.finite]
@@ -79,7 +89,10 @@ class Progress:
         say: Callable[[str], None],
         elapsed: Callable[[], float],
         formation_distance_m: float = FORMATION_DISTANCE_M,
+        *,
+        delayed: bool = False,
     ) -> None:
+        self._delayed = delayed
         self._timesteps = timesteps
         self._say = say
         self._elapsed = elapsed
@@ -149,7 +162,7 @@ class Progress:
         timestep = heard.told + 1
         if len(leader.moves) < timestep:
             return False
-        begun_ns = leader.moves[timestep - 1][0]  # the leader's move opens the timestep
+        begun_ns = leader.moves[0][0]
         moves = heard.timestep_moves(timestep, begun_ns)
         if moves is None:
             return False
@@ -158,12 +171,19 @@ class Progress:
         if neighbour_name != names.LEADER and neighbour.timestep_moves(timestep, begun_ns) is None:
             return False
         ended_ns = heard.timesteps[timestep - 1][0]
-        own_pose, place = heard.resting_pose(ended_ns), neighbour.resting_pose(ended_ns)
+        own_pose = heard.resting_pose(ended_ns)
+        place = neighbour.resting_pose(self._ended_ns(neighbour_name, timestep - 1) if self._delayed else ended_ns)
         if own_pose is None or place is None:
             return False
         heard.told = timestep
         self._say_line(robot, timestep, moves[1:], own_pose, place)  # without the prediction move
         return True
+
+    def _ended_ns(self, robot: str, timestep: int) -> int:
+        """Return when a robot finished a timestep, whose messages are here; 0 for the start."""
+        heard = self._heard[robot]
+        ends = heard.moves if robot == names.LEADER else heard.timesteps
+        return ends[timestep - 1][0] if timestep else 0
 
     def _say_line(self, robot: str, timestep: int, corrections: list[Motion], own: Motion, neighbour: Motion) -> None:
         correction_m = sum(abs(move.x_m) + abs(move.y_m) for move in corrections)

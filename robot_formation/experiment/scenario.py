@@ -46,6 +46,7 @@ from robot_formation.parameters import (
     to_mapping,
 )
 from robot_formation.paths import config_dir
+from robot_formation.schedule.schedules import Schedule, Spacing, check_spacing
 from robot_formation.surface import SURFACES, plate_size
 from robot_formation.system.yaml_files import YamlError, parse_yaml
 from robot_formation.vision.marker import MarkerKind
@@ -65,10 +66,25 @@ FOLLOWS_FROM_SETUP = {
         "start_x_m": "'start_x_m' of the scenario",
         "start_y_m": "'start_y_m' of the scenario",
         "start_heading_rad": "'heading_deg' of the scenario",
+        "schedule": "'schedule' of the scenario",
+        "timesteps": "'leader.timesteps'",
+        "period_s": "'leader.period_s'",
     },
     "block_detector": {"sensor": "'marker'"},
-    "leader": {"followers": "'followers'", "seed": "'seed'", "room_m": "the plate's size"},
-    "fine_tuner": {"done_listeners": "'followers'", "blackouts": "'blackouts' of the scenario"},
+    "leader": {
+        "followers": "'followers'",
+        "seed": "'seed'",
+        "room_m": "the plate's size",
+        "schedule": "'schedule' of the scenario",
+    },
+    "fine_tuner": {
+        "done_listeners": "'followers'",
+        "blackouts": "'blackouts' of the scenario",
+        "schedule": "'schedule' of the scenario",
+        "spacing": "'spacing' of the scenario",
+        "timesteps": "'leader.timesteps'",
+        "period_s": "'leader.period_s'",
+    },
 }
 """Parameters of nodes that follow from the setup, and what is set instead."""
 
@@ -82,7 +98,12 @@ class Setup:
 
     name: str = parameter("", "Name shown in reports")
     seed: int = parameter(0, "Seed of every random stream", low=0, high=2**63 - 1)
-    followers: int = parameter(1, "Number of followers, each beside the one before", low=1, high=9)
+    followers: int = parameter(1, "Number of followers, each beside the one before", low=1, high=10)
+    schedule: Schedule = parameter(Schedule.TURNS, "Who waits for whom before a timestep begins")
+    spacing: Spacing = parameter(
+        Spacing.RIGID,
+        "What a follower's place is: beside its neighbour, or (delayed) where that was one timestep earlier",
+    )
     start_x_m: float = parameter(0.763, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
     start_y_m: float = parameter(0.158, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
     heading_deg: float = parameter(90.0, "Heading of the formation", unit="deg", low=-360.0, high=360.0)
@@ -92,8 +113,9 @@ class Setup:
     )
 
     def __post_init__(self) -> None:
-        """Check that blackouts don't overlap."""
+        """Check that blackouts don't overlap, and that the spacing fits the schedule."""
         blind_timesteps(self.flat_blackouts, "'blackouts'")
+        check_spacing(self.schedule, self.spacing)
 
     @property
     def flat_blackouts(self) -> tuple[int, ...]:
@@ -144,6 +166,9 @@ class Scenario:
         return found
 
     def _known_step(self, kind: str, number: int) -> dict[str, object]:
+        if self.setup.spacing is Spacing.DELAYED:  # its neighbour stands still in timestep 1
+            own = self.settings.get(kind, {})
+            return {name: 0.0 for name in KNOWN_STEP[kind] if name not in own}
         return known_step(kind, self.leader, number, self.fine_tuner.formation_distance_m, self.settings.get(kind, {}))
 
     def by_node(self) -> dict[str, dict[str, object]]:
@@ -222,7 +247,8 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         values = {**node_defaults(kind, setup.marker), **settings.get(kind, {}), **follows}
         return from_mapping(cls, values, where=kind)
 
-    leader = made(LeaderParameters, "leader", followers=_robots(setup)[1:], seed=setup.seed)
+    leader = made(LeaderParameters, "leader", followers=_robots(setup)[1:], seed=setup.seed, schedule=setup.schedule)
+    timed = {"schedule": setup.schedule, "timesteps": leader.timesteps, "period_s": leader.period_s}
     distance_m = made(FineTunerNodeParameters, "fine_tuner").formation_distance_m
     ground = made(WorldNodeParameters, "world")
     x_m, y_m = path_start(leader, setup.followers, setup.heading_deg, distance_m, ground) or (
@@ -234,7 +260,9 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         start_x_m=setup.start_x_m if "start_x_m" in given else x_m,
         start_y_m=setup.start_y_m if "start_y_m" in given else y_m,
     )
-    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m))
+    hidden = setup.followers > 1 and "marker.backdrop_m" not in settings.get("world", {})
+    backdrop = {"marker.backdrop_m": _BACKDROP_M} if hidden else {}
+    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m), **timed, **backdrop)
     own = settings.get("overhead_tracker", {})
     known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
     bounds = prediction_bounds(leader, distance_m, ground)
@@ -249,9 +277,36 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         made(DriveParameters, "drive"),
         made(BlockDetectorNodeParameters, "block_detector"),
         made(PredictorParameters, "predictor", **first["predictor"]),
-        made(FineTunerNodeParameters, "fine_tuner", blackouts=setup.flat_blackouts, **first["fine_tuner"], **bounds),
+        made(
+            FineTunerNodeParameters,
+            "fine_tuner",
+            blackouts=setup.flat_blackouts,
+            spacing=setup.spacing,
+            **timed,
+            **_unchecked_headings(setup, settings),
+            **first["fine_tuner"],
+            **bounds,
+        ),
         with_room(leader, world, setup.followers, distance_m),
     )
+
+
+_BACKDROP_M = 0.16
+"""Boards behind the markers of a chain: without them a follower sees its neighbour's neighbour's marker beside its
+neighbour's as soon as they don't stand in a row, and takes both for one that is nearer. Hides 8 cm per robot."""
+_NO_HEADING_CHECKS: Mapping[str, object] = {
+    "precise.heading_check.turned_rad": 1000.0,
+    "precise.heading_check.beside_sigmas": 1e6,
+    "precise.heading_check.sigma_rad": 1000.0,
+}
+
+
+def _unchecked_headings(setup: Setup, settings: Settings) -> dict[str, object]:
+    """Return the fine-tuner's parameters of a schedule that has no time to drive to where the heading shows."""
+    if not setup.schedule.at_once:
+        return {}
+    own = settings.get("fine_tuner", {})
+    return {name: value for name, value in _NO_HEADING_CHECKS.items() if name not in own}
 
 
 _KNOWN_FROM_ABOVE = ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters")

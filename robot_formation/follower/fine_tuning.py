@@ -19,9 +19,14 @@ from robot_formation.follower.blind_driving import blind_timesteps, out_of_view
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.geometry.uncertain_motion import UncertainMotion
 from robot_formation.parameters import Choice, ParameterError, parameter
+from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
+from robot_formation.schedule.start_rule import StartRule
 from robot_formation.vision.pixy2.block import Block
 
-COLLECTION_TIMESTEPS = 3
+_STILL_FRAMES, _STILL_PX = 10, 2
+"""A robot stands still if its blocks have stayed within so many pixels for so many frames (at 5 cm/s: 7 px)."""
+_MORE_EXTENSIONS = 12
+"""Extensions of a look at a robot that moves: up to two seconds."""
 _UNTOLD = (0.01**2, 0.0, 0.0, 0.0, 0.01**2, 0.0, 0.0, 0.0, 0.02**2)
 """Covariance of the neighbour's step about a command, which has the actuation bias in it: (x, y, yaw) in m and rad."""
 
@@ -182,8 +187,15 @@ class Phase(Enum):
 class FineTuner:
     """State machine of one follower. Stamps are integer nanoseconds of simulated time and tell which frames count."""
 
-    def __init__(self, parameters: FineTunerParameters) -> None:
+    def __init__(self, parameters: FineTunerParameters, rule: StartRule | None = None) -> None:
+        """Begin before the first alignment.
+
+        Args:
+            parameters: of the controller.
+            rule: when a timestep may begin; None: when the neighbour has finished it.
+        """
         self._p = parameters
+        self.rule = rule or StartRule()
         self._phase = Phase.NEIGHBOUR
         self._alignment = _mode(parameters)
         self._displacement = Motion()
@@ -193,6 +205,7 @@ class FineTuner:
         self._resent = 0
         self._blind_timesteps = blind_timesteps(parameters.blackouts)
         self._prediction: Motion | None = None
+        self._residual: Motion | None = None  # of the latest timestep that was seen
         self._step: UncertainMotion | None = None  # the neighbour's next one, as forecast
         self._planned_move: Motion | None = None  # the prediction move, until it has ended
         self._actuation_error: Motion | None = None
@@ -200,7 +213,6 @@ class FineTuner:
         self._frames_wanted = 0
         self._extensions = 0
         self._look_from_ns = -1
-        self._neighbour = -1
         self.timestep = 0
         self.stamp_ns = 0
 
@@ -211,7 +223,11 @@ class FineTuner:
 
     def neighbour_done(self, timestep: int) -> list[Action]:
         """The beacon neighbour stands at its place of this timestep."""
-        self._neighbour = max(self._neighbour, timestep)
+        self.rule.left = max(self.rule.left, timestep)
+        return self.heard()
+
+    def heard(self) -> list[Action]:
+        """The start rule has heard something: begin the next timestep if that may begin now."""
         return self._begin() if self._phase is Phase.NEIGHBOUR else []
 
     def moved(self, motion: Motion, stamp_ns: int) -> list[Action]:
@@ -242,7 +258,10 @@ class FineTuner:
         if len(self._frames) < self._frames_wanted:
             return []
         self.stamp_ns = stamp_ns
-        if not self._stable() and self._extensions < self._p.look.max_extensions:
+        at_once = self.rule.schedule.at_once
+        most = max(self._p.look.max_extensions, _MORE_EXTENSIONS) if at_once else self._p.look.max_extensions
+        settled = self._stable() and (not at_once or self._still())
+        if not settled and self._extensions < most:
             self._extensions += 1
             self._frames_wanted += self._p.look.extra_frames
             return [RequestFrames(self._p.look.extra_frames)]
@@ -284,7 +303,7 @@ class FineTuner:
         return UncertainMotion((left.mean if left else Motion()).inverse().then(command), _UNTOLD)
 
     def _begin(self) -> list[Action]:
-        if self._neighbour < self.timestep:
+        if not self.rule.may_begin(self.timestep):
             return []
         step = UncertainMotion(self._first_step) if self.timestep == 1 else self._step
         self._alignment.restart(self.timestep, step)
@@ -297,7 +316,7 @@ class FineTuner:
     def _go(self) -> list[Action]:
         """Make the prediction move, and take a known heading error out with it."""
         wish = self._planned()
-        turn = self._alignment.turn(wish.yaw_rad)
+        turn = wish.yaw_rad if self.rule.delayed else self._alignment.turn(wish.yaw_rad)
         motion = Motion(
             _clip(wish.x_m, self._p.max_v_m), _clip(wish.y_m, self._p.max_u_m), _clip(turn, self._p.max_turn_rad)
         )
@@ -337,6 +356,8 @@ class FineTuner:
         return self.timestep in self._blind_timesteps
 
     def _planned(self) -> Motion:
+        if self.rule.delayed:  # the place where it was seen last
+            return Motion() if self.timestep == 1 or self._residual is None else self._residual
         if self.timestep == 1:
             return self._first_step
         if self.timestep <= COLLECTION_TIMESTEPS or self._prediction is None:
@@ -356,6 +377,14 @@ class FineTuner:
         kinds = [sorted((block.signature, block.index) for block in blocks) for blocks in last]
         return all(kind == kinds[0] for kind in kinds)
 
+    def _still(self) -> bool:
+        """Whether the neighbour seems to stand: its blocks are where they were some frames ago."""
+        before, now = ({block.signature: block for block in self._frames[at]} for at in (-_STILL_FRAMES, -1))
+        return all(
+            abs(before[face].x - now[face].x) <= _STILL_PX and abs(before[face].height - now[face].height) <= _STILL_PX
+            for face in before.keys() & now.keys()
+        )
+
     def _decide(self, decision: Decision) -> list[Action]:
         if decision.verdict is Verdict.LOST:
             self._phase = Phase.LOST
@@ -368,10 +397,12 @@ class FineTuner:
             return [State(AlignmentState.SEARCH, decision.reason), *self._move(decision.motion)]
         actions: list[Action] = [State(AlignmentState.REACQUIRED)] if self._out_of_view else []
         self._out_of_view = False
-        if decision.verdict is Verdict.MOVE:
+        uncorrected = decision.verdict is Verdict.MOVE and not self.rule.corrects(self.timestep)
+        if decision.verdict is Verdict.MOVE and not uncorrected:
             return [*actions, State(AlignmentState.CORRECT, decision.reason), *self._move(decision.motion)]
         aligned = decision.verdict is Verdict.ALIGNED
-        actions.append(State(AlignmentState.ALIGNED if aligned else AlignmentState.UNALIGNED))
+        left = "left to the next move" if uncorrected else ""
+        actions.append(State(AlignmentState.ALIGNED if aligned else AlignmentState.UNALIGNED, left))
         if decision.verdict is Verdict.UNALIGNED:
             actions.append(Warn(decision.reason))
         if self.timestep == 0:
@@ -380,6 +411,7 @@ class FineTuner:
 
     def _report(self, residual: UncertainMotion | None) -> list[Action]:
         self._phase = Phase.PREDICTION
+        self._residual = residual.mean if residual is not None else None
         total = self._previous = self._displacement
         commanded = None
         if (error := self._actuation_error) is not None:

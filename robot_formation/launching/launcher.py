@@ -26,6 +26,7 @@ from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
 from robot_formation.leader.paths import Teleop
 from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, is_of_domain
+from robot_formation.schedule.schedules import Spacing
 from robot_formation.system.signal_handling import SignalCounter
 from robot_formation.system.temporary_folder import RUN, temporary_folder
 
@@ -144,6 +145,7 @@ class Launcher:
             self._tell,
             lambda: time.monotonic() - began,
             scenario.fine_tuner.formation_distance_m,
+            delayed=scenario.setup.spacing is Spacing.DELAYED,
         )
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:

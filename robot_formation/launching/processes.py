@@ -14,6 +14,7 @@ from robot_formation.calibration.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.parameters import to_mapping
+from robot_formation.schedule.schedules import Spacing
 from robot_formation.system.git_commit import git_commit
 
 RECORDER = "recorder"
@@ -75,6 +76,7 @@ def progress(scenario: Scenario, namespace: str) -> Process:
         "followers": scenario.setup.followers,
         "timesteps": scenario.leader.timesteps,
         "formation_distance_m": scenario.fine_tuner.formation_distance_m,
+        "delayed": scenario.setup.spacing is Spacing.DELAYED,
     }
     return Process(names.PROGRESS, namespace, parameters)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from robot_formation.geometry.se2 import Motion
 from robot_formation.leader.paths import PATHS, Given, LeaderPath, Room, make_path
 from robot_formation.parameters import ParameterError, parameter
+from robot_formation.schedule.schedules import Schedule, begin_s, period_parameter
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class LeaderParameters:
         high=1000.0,
     )
     followers: tuple[str, ...] = parameter(("follower_1",), "Robots whose done ticks are waited for")
+    schedule: Schedule = parameter(Schedule.TURNS, "Who waits for whom before a timestep begins")
+    period_s: float = period_parameter()
 
     def __post_init__(self) -> None:
         """Check that the room has four sides."""
@@ -87,7 +90,11 @@ class Leader:
         self._parameters = parameters
         self.path = parameters.make_path()
         self._motion = motion or self.path.motion
-        self._ready: dict[str, int] = dict.fromkeys(parameters.followers, -1)
+        self._schedule = parameters.schedule
+        # In wave and together only the neighbour's ticks are heard, with timer nobody's.
+        heard = parameters.followers if self._schedule is Schedule.TURNS else parameters.followers[:1]
+        self._ready: dict[str, int] = dict.fromkeys(() if self._schedule is Schedule.TIMER else heard, -1)
+        self._now_ns = 0
         self._moving = False
         self.timestep = 0
         self.paused = False
@@ -109,6 +116,16 @@ class Leader:
         self._ready[follower] = timestep
         return self._next()
 
+    @property
+    def heard(self) -> Sequence[str]:
+        """The followers whose ticks are waited for."""
+        return list(self._ready)
+
+    def clock(self, now_ns: int) -> LeaderAction:
+        """Process simulated time since the start: with `timer` it begins the timesteps."""
+        self._now_ns = now_ns
+        return self._next()
+
     def moved(self) -> LeaderAction:
         """The drive has finished the step: tick the timestep."""
         if not self._moving:
@@ -125,10 +142,20 @@ class Leader:
         self.paused = False
         return self._next()
 
+    @property
+    def _due(self) -> bool:
+        """Whether the clock lets the next timestep begin."""
+        if self._schedule is not Schedule.TIMER:
+            return True
+        begin = begin_s(self.timestep + 1, self._parameters.period_s)
+        return self._now_ns >= round(1e9 * begin)
+
     def _next(self) -> LeaderAction:
-        if self._moving or self.paused or self.finished or self.waiting_for:
+        if self._moving or self.paused or self.finished or self.waiting_for or not self._due:
             return NOTHING
         if self.timestep == self._parameters.timesteps:
+            if self._schedule is Schedule.WAVE and min(self._ready.values(), default=0) <= self.timestep:
+                return NOTHING  # one tick more says that all robots behind have finished
             self.finished = True
             return LeaderAction(finished=True)
         motion = self._motion(self.timestep + 1)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from robot_formation.names import ENCODER_WHEELS, WHEELS
 from robot_formation.world.parameters import WorldParameters
-from robot_formation.world.scene import PEDESTAL_M
+from robot_formation.world.scene import BACKDROP_THICKNESS_M, PEDESTAL_M
 
 _WHEEL_WIDTH_M = 0.03
 _ENCODER_WHEEL_WIDTH_M = 0.01
@@ -68,6 +68,10 @@ def _add_base(robot: Element, parameters: WorldParameters) -> None:
     if foot > chassis.body_top_m:
         post = (PEDESTAL_M, PEDESTAL_M, foot - chassis.body_top_m)
         _box(link, "visual", post, (0.0, 0.0, 0.5 * (foot + chassis.body_top_m)), marker.body_rgb)
+    if marker.backdrop_m > 0.0:
+        board = (marker.backdrop_m, BACKDROP_THICKNESS_M, marker.top_m - chassis.body_top_m)
+        place = (0.0, 0.5 * (marker.edge_m + BACKDROP_THICKNESS_M), 0.5 * (marker.top_m + chassis.body_top_m))
+        _box(link, "visual", board, place, marker.body_rgb)
 
 
 def _add_wheel(

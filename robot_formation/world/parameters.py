@@ -234,6 +234,14 @@ class MarkerParameters:
     rear_rgb: tuple[int, ...] = parameter((14, 34, 200), "Rear face", low=0, high=255)
     tag_light_rgb: tuple[int, ...] = parameter((200, 200, 200), "tags: light modules and margin", low=0, high=255)
     tag_dark_rgb: tuple[int, ...] = parameter((12, 12, 13), "tags: dark modules", low=0, high=255)
+    backdrop_m: float = parameter(
+        0.0,
+        "width of a dark board at the cube's left face, which hides the markers of robots farther left; 0: none. "
+        "A scenario with two followers and more sets 0.16",
+        unit="m",
+        low=0.0,
+        high=0.5,
+    )
     body_rgb: tuple[int, ...] = parameter((12, 12, 13), "robot body and the cube's other faces", low=0, high=255)
     dot_rgb: tuple[int, ...] = parameter((230, 230, 230), "reference dot", low=0, high=255)
     dot_radius_m: float = parameter(0.015, "radius of the reference dot", unit="m", low=0.001, high=0.2)

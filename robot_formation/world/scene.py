@@ -22,6 +22,7 @@ FULL = 65535.0
 """Linear light 1 in the 16-bit drawing."""
 PEDESTAL_M = 0.03
 """Edge of the post between body and marker."""
+BACKDROP_THICKNESS_M = 0.002
 
 _BOX = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _SIDES: tuple[tuple[tuple[int, int, int, int], tuple[float, float, float]], ...] = (
@@ -57,6 +58,9 @@ class Scene:
         self._add_box(body, chassis.body_bottom_m, (grey,) * 5)
         if foot > chassis.body_top_m:
             self._add_box((PEDESTAL_M, PEDESTAL_M, foot - chassis.body_top_m), chassis.body_top_m, (grey,) * 5)
+        if marker.backdrop_m > 0.0:
+            board = (marker.backdrop_m, BACKDROP_THICKNESS_M, marker.top_m - chassis.body_top_m)
+            self._add_box(board, chassis.body_top_m, (grey,) * 5, y_m=0.5 * (marker.edge_m + BACKDROP_THICKNESS_M))
         target, front, rear = marker.face_colours
         self._add_box((marker.edge_m,) * 3, foot, (front, rear, grey, target, grey))
         if marker.kind is MarkerKind.TAGS:
@@ -68,8 +72,10 @@ class Scene:
         self._add_face(dot + np.array([0.0, 0.0, marker.top_m]), np.array([0.0, 0.0, 1.0]), marker.dot_rgb)
         self._make_plate(surface, camera.plate_patches, camera.plate_albedo)
 
-    def _add_box(self, size: tuple[float, ...], bottom: float, colours: tuple[tuple[int, ...], ...]) -> None:
-        corners = _BOX * size + [0.0, 0.0, bottom + 0.5 * size[2]]
+    def _add_box(
+        self, size: tuple[float, ...], bottom: float, colours: tuple[tuple[int, ...], ...], *, y_m: float = 0.0
+    ) -> None:
+        corners = _BOX * size + [0.0, y_m, bottom + 0.5 * size[2]]
         for (indices, normal), colour in zip(_SIDES, colours, strict=True):
             self._add_face(corners[list(indices)], np.array(normal), colour)
 

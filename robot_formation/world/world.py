@@ -69,6 +69,7 @@ class World:
         self._camera = Camera(surface, parameters)
         self._sensors = {name: Sensor(parameters.camera, seed, name) for name in self._frames_owed}
         self._pictures: dict[str, tuple[tuple[Pose, ...], Development]] = {}
+        self._owed_until = 0  # step up to which time goes on by itself
 
     # --- asking -----------------------------------------------------------------------------------------------------
 
@@ -84,11 +85,11 @@ class World:
 
     @property
     def owes(self) -> bool:
-        """Whether a motion isn't at rest or requested frames are outstanding."""
+        """Whether a motion isn't at rest, requested frames are outstanding, or time was asked for."""
         for robot in self._robots.values():
             if robot.moving:
                 return True
-        return any(self._frames_owed.values())
+        return any(self._frames_owed.values()) or self.step_count < self._owed_until
 
     @property
     def at_rest(self) -> bool:
@@ -146,11 +147,20 @@ class World:
             )
         self._frames_owed[robot] = owed
 
+    def owe_time(self, until_ns: int) -> None:
+        """Let time go on at least until the first frame at or after a time since the start, nanoseconds."""
+        steps = -(-until_ns * self.parameters.physics_hz // 10**9)
+        self._owed_until = max(self._owed_until, steps + -steps % self._frame_steps)
+
+    def frames_owed(self, robot: str) -> int:
+        """How many requested frames of a robot's camera are outstanding."""
+        return self._frames_owed.get(robot, 0)
+
     def advance(self) -> list[Event]:
         """Go on to the next instant at which something is published, and return it; empty if nothing is owed."""
         while self.owes:
             events = self._step()
-            if events:
+            if events or self.step_count == self._owed_until:
                 return events
         return []
 

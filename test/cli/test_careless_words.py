@@ -30,7 +30,7 @@ LINES = {
     "run --set ''": "--set takes KEY=VALUE",
     "run --set =3": "--set: no entry ''; there are: ",
     "run --set seed=": "'seed' must be of type int, not None",
-    "run --set followers=99": "'followers' is 99, outside 1 to 9",
+    "run --set followers=99": "'followers' is 99, outside 1 to 10",
     "run --camera ''": "--camera can't be ''; there are: on_demand, stream",
     "run --real-time-factor inf": "'inf' is not a number",
     "run --images=3": "--images: takes no value, not '3'",

@@ -276,7 +276,7 @@ def test_every_predictor_can_be_chosen(track_two: Scenario) -> None:
         ("seed=!!python/object:os.system x", "is no YAML value"),
         ("seed=-1", "'seed' is -1, outside 0 to"),
         ("seed=1.5", "'seed' must be of type int"),
-        ("followers=0", "'followers' is 0, outside 1 to 9"),
+        ("followers=0", "'followers' is 0, outside 1 to 10"),
         ("world.camera.mod=stream", "no parameter 'camera.mod'; did you mean 'camera.mode'?"),
         ("world.camera.mode=steam", "'camera.mode' can't be 'steam'; did you mean 'stream'?"),
         ("world.mode=stream", "did you mean 'camera.mode'?"),
@@ -319,7 +319,7 @@ def test_wrong_parameters_of_a_surface_are_found_by_the_check(track_two: Scenari
         ("predictor: {nme: previous}\n", "predictor: no parameter 'nme'; did you mean 'name'?"),
         ("predictor: {name: prevoius}\n", "did you mean 'previous'?"),
         ("seed: many\n", "'seed' must be of type int, not 'many'"),
-        ("followers: 20\n", "'followers' is 20, outside 1 to 9"),
+        ("followers: 20\n", "'followers' is 20, outside 1 to 10"),
         ("name: 3\n", "'name' must be of type str, not 3"),
     ],
 )

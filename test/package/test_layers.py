@@ -13,8 +13,23 @@ from repository import PACKAGE
 # From the bottom to the top, in a strict order: a part imports those before it only.
 LAYERS = [
     ("errors", "exit_codes", "json_values", "names", "parameters", "paths", ""),
-    *((room,) for room in ("system", "network", "batch", "geometry", "koopman", "surface", "bag", "vision", "world")),
-    *((room,) for room in ("drive", "leader", "alignment", "follower", "analysis", "conversions", "components")),
+    *(
+        (room,)
+        for room in (
+            "system",
+            "network",
+            "batch",
+            "geometry",
+            "schedule",
+            "koopman",
+            "surface",
+            "bag",
+            "vision",
+            "world",
+        )
+    ),
+    *((room,) for room in ("drive", "leader", "alignment", "follower", "analysis")),
+    *((room,) for room in ("conversions", "components")),
     *((room,) for room in ("calibration", "experiment", "nodes", "launching", "cli")),
 ]
 LEVEL = {area: level for level, areas in enumerate(LAYERS) for area in areas}

@@ -30,7 +30,7 @@ _QUIET_ROUNDS, _MOST_ROUNDS = 4, 60
 class ProgressParameters:
     """What is followed."""
 
-    followers: int = parameter(1, "Number of followers", low=1, high=9)
+    followers: int = parameter(1, "Number of followers", low=1, high=10)
     timesteps: int = parameter(15, "Timesteps of the run, for the lines", low=1, high=1_000_000)
     formation_distance_m: float = parameter(
         FORMATION_DISTANCE_M,
@@ -39,6 +39,7 @@ class ProgressParameters:
         low=0.05,
         high=2.0,
     )
+    delayed: bool = parameter(False, "Whether places are those of one timestep earlier, for the formation error")
 
 
 class ProgressExecutable:
@@ -57,6 +58,7 @@ class ProgressExecutable:
             _say,
             lambda: time.monotonic() - began,
             parameters.formation_distance_m,
+            delayed=parameters.delayed,
         )
         for name in self._progress.topics:
             topic = topic_of(name)
