@@ -73,6 +73,7 @@ class PathCheck:
             ParameterError: with one line that says which robot fails in which timestep, and what would fit.
         """
         path = self.leader.make_path()
+        self._require_start(path)
         problem = self.problem(path)
         if problem is None:
             return
@@ -80,6 +81,28 @@ class PathCheck:
         raise ParameterError(
             f"path '{self.leader.path}': {problem.robot} {problem.text} {when}{self._remedy(path, problem)}"
         )
+
+    def _require_start(self, path: LeaderPath) -> None:
+        """Check that the robots of a chain stand on the plate over their whole width.
+
+        The paper's tracks begin with all rear wheels at the edge; with those of one side beyond it a robot turns and
+        pushes the others.
+        """
+        if self.followers < 2 or self.chosen or not self.world.leaving_ends_run:
+            return
+        start = self._start(path)
+        whole = replace(formation(self.world, self.followers, self.distance_m), length_m=0.0)
+        pose = np.array([(start.x_m, start.y_m, start.yaw_rad)])
+        for number, robot in enumerate(self._robots):
+            box = whole.boxes(pose, [number])
+            if self._off(box)[0]:
+                size_m = _up(float(box.max()))
+                larger = f" or a plate of {size_m:.2f} m (world.surface_parameters=[size_m={size_m:.2f}])"
+                raise ParameterError(
+                    f"{robot} would stand with a part of its body beyond the plate of {self._plate_m:g} x "
+                    f"{self._plate_m:g} m; take fewer followers, another start_x_m and start_y_m"
+                    f"{larger if size_m > self._plate_m and box.min() >= 0.0 else ''}"
+                )
 
     def problem(self, path: LeaderPath) -> Problem | None:
         """Find the first reason why a path can't be followed; None if it can."""
