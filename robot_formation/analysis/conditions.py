@@ -24,6 +24,8 @@ def conditions(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, obje
         "marker": _word(world.get("marker.kind")),
         "followers": len(robots) - 1 if isinstance(robots, (list, tuple)) and robots else None,
         "drive_mode": _word(world.get("motor.drive_mode")),
+        "schedule": _word(fine_tuner.get("schedule")),
+        "spacing": _word(fine_tuner.get("spacing")),
     }
 
 
@@ -40,6 +42,10 @@ def conditions_text(found: Mapping[str, object]) -> str:
         said.append(f"{found['followers']} followers")
     if found.get("drive_mode") not in (None, "pwm_stop"):
         said.append(f"drive {found['drive_mode']}")
+    if found.get("schedule") not in (None, "turns"):
+        said.append(f"schedule {found['schedule']}")
+    if found.get("spacing") not in (None, "rigid"):
+        said.append(f"spacing {found['spacing']}")
     return ", ".join(said)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from collections.abc import Callable
 
@@ -11,6 +12,7 @@ from robot_formation.analysis.run_record import RunRecord
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import Message
+from robot_formation.parameters import to_mapping
 
 OUTCOMES = {exit_codes.DONE: "done", exit_codes.LOST: "lost"}
 
@@ -46,6 +48,8 @@ def run_in_memory(
     details = {
         "scenario": scenario.setup.name,
         "timesteps": str(scenario.leader.timesteps),
+        # What the analysis reads of them: spacing, distances, the marker's height.
+        "parameters": json.dumps({"fine_tuner": to_mapping(scenario.fine_tuner), "world": to_mapping(scenario.world)}),
         "outcome": OUTCOMES.get(code, "incomplete"),
     }
     return record_of(scenario.robots, messages, details, stamps)

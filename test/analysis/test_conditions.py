@@ -6,7 +6,7 @@ from robot_formation.analysis.conditions import conditions, conditions_text, run
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
 
-COMMON = {"marker": "colours", "followers": 1, "drive_mode": "pwm_stop"}
+COMMON = {"marker": "colours", "followers": 1, "drive_mode": "pwm_stop", "schedule": "turns", "spacing": "rigid"}
 
 
 def test_conditions_come_out_of_what_a_run_says_of_itself() -> None:
@@ -23,6 +23,8 @@ def test_conditions_come_out_of_what_a_run_says_of_itself() -> None:
             "marker": "tags",
             "followers": 2,
             "drive_mode": "pwm_stop",
+            "schedule": "turns",
+            "spacing": "rigid",
             "in_process": True,
         },
     }
@@ -57,3 +59,8 @@ def test_a_bag_whose_metadata_was_made_up_has_unknown_conditions(parameters: str
 def test_what_nearly_every_run_has_is_not_said() -> None:
     assert conditions_text({"mode": "precise", "camera": "stream", **COMMON}) == "alignment precise, camera stream"
     assert conditions({}) == {"mode": None, "camera": None, **dict.fromkeys(COMMON)}
+
+
+def test_another_schedule_is_another_condition() -> None:
+    found = run_facts(run_metadata(override(load_track("one"), ["schedule=timer", "spacing=delayed"])))["conditions"]
+    assert conditions_text(found).endswith("schedule timer, spacing delayed")

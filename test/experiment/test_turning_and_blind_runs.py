@@ -104,7 +104,9 @@ def test_in_a_blackout_the_follower_drives_by_forecast_and_finds_the_leader_afte
 
 
 def test_a_follower_that_knows_too_little_holds_still_and_says_so() -> None:
-    recorded, _ = follower(run_in_memory(scenario("leader.path=random_walk", "blackouts=[[12, 8]]", timesteps=19)))
+    recorded, _ = follower(
+        run_in_memory(scenario("leader.path=random_walk", "seed=6", "blackouts=[[12, 8]]", timesteps=19))
+    )
     said = [text for text in recorded.states if AlignmentState.parse(text) is AlignmentState.BLIND]
     assert len(said) == 8
     assert "holding still" in said[-1]

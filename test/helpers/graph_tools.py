@@ -34,11 +34,11 @@ def short_scenario(*settings: str, track: str = "two", seed: int = 3) -> Scenari
     return scenarios.override(scenarios.load_track(track), [f"seed={seed}", *SHORT, *settings])
 
 
-def displacements(bag: Path) -> list[tuple[int, float, float, float]]:
+def displacements(bag: Path, follower: int = 0) -> list[tuple[int, float, float, float]]:
     """What the follower says it drove, exactly as recorded."""
     return [
         (entry.stamp_ns, entry.motion.x_m, entry.motion.y_m, entry.motion.yaw_rad)
-        for entry in load_run(bag).followers[0].displacements
+        for entry in load_run(bag).followers[follower].displacements
     ]
 
 

@@ -1,0 +1,133 @@
+"""Whole runs by each schedule, in process: who waits for whom, what it costs in time, and what lags."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from robot_formation.analysis.quantities import RunAnalysis, analyse
+from robot_formation.analysis.run_record import RunRecord
+from robot_formation.errors import FormationError
+from robot_formation.experiment.in_memory_record import run_in_memory
+from robot_formation.experiment.in_process import InProcessRun
+from robot_formation.experiment.scenario import Scenario, load, load_track, override, presets
+
+pytestmark = pytest.mark.xdist_group("schedules")
+
+GROUND = (
+    "world.surface_parameters=[size_m=2.6, curvature_per_m=0.06]",
+    "start_x_m=0.82",
+    "start_y_m=0.9",
+    "world.camera.mode=on_demand",
+    "world.overhead.enabled=false",
+    "followers=2",
+    "leader.timesteps=6",
+    "seed=5",
+)
+
+
+def scenario(*settings: str) -> Scenario:
+    return override(load_track("one"), [*GROUND, *settings])
+
+
+@cache
+def record(*settings: str) -> RunRecord:
+    return run_in_memory(scenario(*settings))
+
+
+@cache
+def analysed(*settings: str) -> RunAnalysis:
+    return analyse(record(*settings))
+
+
+@pytest.mark.parametrize("settings", [("schedule=wave",), ("schedule=together",), ("schedule=timer",)])
+def test_every_schedule_keeps_the_formation(settings: tuple[str, ...]) -> None:
+    found = analysed(*settings)
+    assert found.outcome == "done"
+    for follower in found.followers:
+        assert follower.totals["timesteps_finished"] == 6
+        assert follower.totals["formation_error_rmse_m"] < 0.02
+
+
+def test_a_wave_gives_the_first_follower_the_run_of_turns() -> None:
+    """Every look is at a standing robot: but for when they happen, the first follower's timesteps are the same."""
+    turns, wave = (record(f"schedule={name}").followers[0] for name in ("turns", "wave"))
+    for ours, theirs in zip(turns.displacements, wave.displacements, strict=True):
+        assert np.allclose((ours.motion.x_m, ours.motion.y_m), (theirs.motion.x_m, theirs.motion.y_m), atol=0.005)
+
+
+def test_moving_at_once_takes_less_time_than_turns() -> None:
+    turns, together = (record(f"schedule={name}").simulated_s for name in ("turns", "together"))
+    assert together < 0.8 * turns
+
+
+def test_the_timer_has_no_ticks() -> None:
+    heard: set[str] = set()
+    code, _ = InProcessRun(scenario("schedule=timer"), listen=lambda name, message: heard.add(name)).run()
+    assert code == 0
+    assert not [name for name in heard if name.startswith("/formation/")]
+
+
+def test_timesteps_of_the_timer_begin_by_the_clock() -> None:
+    moves = record("schedule=timer").leader_moved
+    starts = [16.0, 32.0, 48.0, 64.0, 68.0, 72.0]
+    for move, start in zip(moves, starts, strict=True):
+        assert start < move.stamp_ns / 1e9 < start + 2.0
+
+
+def test_delayed_places_lag_by_a_step_per_robot() -> None:
+    found = analysed("schedule=timer", "spacing=delayed", "leader.timesteps=8")
+    for follower in found.followers:
+        assert follower.totals["formation_error_rmse_m"] < 0.015
+        assert follower.totals["leader_error_rmse_m"] < 0.02
+        assert 0.03 < follower.totals["lag_m"] < 0.06
+    tracks = record("schedule=timer", "spacing=delayed", "leader.timesteps=8").tracks
+    ends = [tracks[robot].positions_m[-1, 1] for robot in ("leader", "follower_1", "follower_2")]
+    assert np.allclose(np.diff(ends), -0.05, atol=0.02)
+
+
+def test_rigid_places_have_no_lag() -> None:
+    assert analysed("schedule=together").followers[0].totals["lag_m"] == 0.0
+
+
+def test_the_same_seed_gives_the_same_run() -> None:
+    again = run_in_memory(scenario("schedule=together"))
+    assert again.followers == record("schedule=together").followers
+
+
+def test_a_third_robots_marker_is_hidden() -> None:
+    """Three followers on gentle ground: without boards behind the markers the third searches for its neighbour."""
+    found = analysed("followers=3", "schedule=together", "leader.timesteps=10")
+    assert scenario("followers=3").world.marker.backdrop_m == 0.16
+    assert scenario("followers=1").world.marker.backdrop_m == 0.0
+    assert scenario("followers=3", "world.marker.backdrop_m=0").world.marker.backdrop_m == 0.0
+    assert all(not follower.totals["losses"] for follower in found.followers)
+    assert max(follower.totals["formation_error_rmse_m"] for follower in found.followers) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["spacing=delayed"], "needs a schedule in which robots move at the same time"),
+        (["schedule=fast"], "'schedule' can't be 'fast'; there are: "),
+        (["fine_tuner.schedule=wave"], "set 'schedule' of the scenario instead"),
+        (["leader.schedule=wave"], "set 'schedule' of the scenario instead"),
+        (["world.period_s=1.0"], "set 'leader.period_s' instead"),
+    ],
+)
+def test_what_does_not_fit_is_refused(settings: list[str], message: str) -> None:
+    with pytest.raises(FormationError, match=message):
+        scenario(*settings)
+
+
+def test_a_chain_stands_on_the_plate() -> None:
+    override(load_track("one"), ["followers=2"]).check()
+    with pytest.raises(FormationError, match=r"follower_3 would stand with a part of its body beyond the plate.*1\.85"):
+        override(load_track("one"), ["followers=3"]).check()
+
+
+@pytest.mark.parametrize(("name", "followers"), [("line_of_five", 5), ("line_of_ten", 10)])
+def test_lines_fit_their_plates(name: str, followers: int) -> None:
+    found = load(presets()[name])
+    found.check()
+    assert found.setup.followers == followers
