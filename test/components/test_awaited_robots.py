@@ -53,9 +53,12 @@ def test_a_robot_that_begins_before_it_was_heard_to_end_has_begun_the_next_times
     awaited = AwaitedRobots(Schedule.TOGETHER, ROBOTS[:2], 5, 1.0)
     awaited.ordered("follower_1", frames=True)
     awaited.looked("follower_1")
-    steps = [lambda: awaited.idle("follower_1"), lambda: awaited.ordered("follower_1")]
-    for step in reversed(steps) if early else steps:
-        step()
+    if early:
+        awaited.ordered("follower_1")
+        awaited.idle("follower_1")
+    else:
+        awaited.idle("follower_1")
+        awaited.ordered("follower_1")
     awaited.ordered("leader")
     awaited.begun("leader", 1)
     assert not awaited.any

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-from test_barrier import FOLLOWER_NODES, Witness
 
 from graph_tools import BusyCores, displacements, launch, short_scenario
+from graph_witness import FOLLOWER_NODES, Witness
 from robot_formation import names
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import Scenario
