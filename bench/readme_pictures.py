@@ -7,6 +7,7 @@ import argparse
 import math
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -181,29 +182,48 @@ def draw_view(folder: Path) -> None:
         DetectorParameters, {"signature_range": [5.0, 6.0, 6.0], "max_merge_dist": 4}, where="bench"
     )
     detector = BlockDetector(load_signatures(config_dir() / "signatures.yaml"), parameters)
-    _draw_blocks(folder / "camera.jpg", WORLD, detector, ((0.0, 0.0, 0.0), (0.12, 0.0, 0.0)))
+    _draw_blocks(folder / "camera.jpg", detector, [_view(WORLD), _view(WORLD, ahead_m=0.12)])
+
+
+def draw_boards(folder: Path) -> None:
+    """Draw a neighbour and, 5 cm ahead of it, the robot farther left, without and with boards behind the markers."""
+    detector = BlockDetector(load_signatures(config_dir() / "signatures.yaml"), DetectorParameters())
+    boards = [from_mapping(WorldParameters, {"marker": {"backdrop_m": width}}, where="bench") for width in (0.0, 0.16)]
+    _draw_blocks(folder / "boards.jpg", detector, [_view(world, farther_ahead_m=0.05) for world in boards])
 
 
 def draw_tags(folder: Path) -> None:
     """Draw the marker of tags in formation, and from behind and aside with the leader turned."""
     world = from_mapping(WorldParameters, {"marker": {"kind": "tags"}}, where="bench")
-    _draw_blocks(folder / "tags.jpg", world, TagDetector(), ((0.0, 0.0, 0.0), (-0.08, 0.06, math.radians(35.0))))
+    turned = _view(world, ahead_m=-0.08, away_m=0.06, yaw_rad=math.radians(35.0))
+    _draw_blocks(folder / "tags.jpg", TagDetector(), [_view(world), turned])
 
 
-def _draw_blocks(
-    path: Path,
+def _view(
     world: WorldParameters,
-    detector: BlockDetector | TagDetector,
-    views: tuple[tuple[float, float, float], tuple[float, float, float]],
-) -> None:
-    """Draw views of the neighbour (follower ahead and farther away in m, neighbour's turn), enlarged twice."""
+    *,
+    ahead_m: float = 0.0,
+    away_m: float = 0.0,
+    yaw_rad: float = 0.0,
+    farther_ahead_m: float | None = None,
+) -> npt.NDArray[np.uint8]:
+    """Take a follower's picture from ahead of its place and farther away, of a neighbour that has turned.
+
+    With `farther_ahead_m` another robot stands on the neighbour's left, so far ahead of it.
+    """
     plane = make_surface("plane")
+    looking = pose_on_surface(plane, 0.9 + ahead_m, 0.6 - away_m, 0.0)
+    seen = [pose_on_surface(plane, 0.9, 0.6 + FORMATION_DISTANCE_M, yaw_rad)]
+    if farther_ahead_m is not None:
+        seen.append(pose_on_surface(plane, 0.9 + farther_ahead_m, 0.6 + 2.0 * FORMATION_DISTANCE_M, 0.0))
+    sensor = Sensor(world.camera, SEED, "follower_1")
+    return sensor.expose(sensor.develop(Camera(plane, world).light(looking, seen)), 0.0)
+
+
+def _draw_blocks(path: Path, detector: BlockDetector | TagDetector, views: Sequence[npt.NDArray[np.uint8]]) -> None:
+    """Draw two pictures side by side with their blocks, enlarged twice."""
     pictures = []
-    for ahead_m, away_m, yaw_rad in views:
-        looking = pose_on_surface(plane, 0.9 + ahead_m, 0.6 - away_m, 0.0)
-        seen = pose_on_surface(plane, 0.9, 0.6 + FORMATION_DISTANCE_M, yaw_rad)
-        sensor = Sensor(world.camera, SEED, "follower_1")
-        picture = sensor.expose(sensor.develop(Camera(plane, world).light(looking, [seen])), 0.0)
+    for picture in views:
         large = cv2.resize(picture, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
         for block in detector.detect(picture):
             left, top = 2 * block.x - block.width, 2 * block.y - block.height
@@ -225,7 +245,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=PICTURES, help="folder (default: docs/pictures)")
     folder = parser.parse_args().out
     folder.mkdir(parents=True, exist_ok=True)
-    for draw in (draw_run, draw_frames, draw_view, draw_tags):
+    for draw in (draw_run, draw_frames, draw_view, draw_boards, draw_tags):
         draw(folder)
     return 0
 

@@ -20,6 +20,7 @@ from robot_formation.components.node_parameters import (
 )
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
+from robot_formation.experiment.chain_defaults import backdrop, unchecked_headings
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.experiment.path_check import PathCheck
 from robot_formation.experiment.path_plan import (
@@ -260,9 +261,8 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         start_x_m=setup.start_x_m if "start_x_m" in given else x_m,
         start_y_m=setup.start_y_m if "start_y_m" in given else y_m,
     )
-    hidden = setup.followers > 1 and "marker.backdrop_m" not in settings.get("world", {})
-    backdrop = {"marker.backdrop_m": _BACKDROP_M} if hidden else {}
-    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m), **timed, **backdrop)
+    boards = backdrop(setup.followers, settings.get("world", {}))
+    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m), **timed, **boards)
     own = settings.get("overhead_tracker", {})
     known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
     bounds = prediction_bounds(leader, distance_m, ground)
@@ -283,30 +283,12 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
             blackouts=setup.flat_blackouts,
             spacing=setup.spacing,
             **timed,
-            **_unchecked_headings(setup, settings),
+            **unchecked_headings(setup.schedule, settings.get("fine_tuner", {})),
             **first["fine_tuner"],
             **bounds,
         ),
         with_room(leader, world, setup.followers, distance_m),
     )
-
-
-_BACKDROP_M = 0.16
-"""Boards behind the markers of a chain: without them a follower sees its neighbour's neighbour's marker beside its
-neighbour's as soon as they don't stand in a row, and takes both for one that is nearer. Hides 8 cm per robot."""
-_NO_HEADING_CHECKS: Mapping[str, object] = {
-    "precise.heading_check.turned_rad": 1000.0,
-    "precise.heading_check.beside_sigmas": 1e6,
-    "precise.heading_check.sigma_rad": 1000.0,
-}
-
-
-def _unchecked_headings(setup: Setup, settings: Settings) -> dict[str, object]:
-    """Return the fine-tuner's parameters of a schedule that has no time to drive to where the heading shows."""
-    if not setup.schedule.at_once:
-        return {}
-    own = settings.get("fine_tuner", {})
-    return {name: value for name, value in _NO_HEADING_CHECKS.items() if name not in own}
 
 
 _KNOWN_FROM_ABOVE = ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters")

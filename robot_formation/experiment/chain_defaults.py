@@ -1,0 +1,26 @@
+"""Defaults that follow from how many followers a scenario has, and from its schedule."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robot_formation.schedule.schedules import Schedule
+
+_BACKDROP = {"marker.backdrop_m": 0.16}
+"""Boards behind the markers of a chain: without them a follower sees its neighbour's neighbour's marker beside its
+neighbour's as soon as they don't stand in a row, and takes both for one that is nearer. Hides 8 cm per robot."""
+_NO_HEADING_CHECKS = {
+    "precise.heading_check.turned_rad": 1000.0,
+    "precise.heading_check.beside_sigmas": 1e6,
+    "precise.heading_check.sigma_rad": 1000.0,
+}
+
+
+def backdrop(followers: int, own: Mapping[str, object]) -> dict[str, float]:
+    """Return the world's parameters of a chain's markers, apart from those that are set."""
+    return {name: value for name, value in _BACKDROP.items() if followers > 1 and name not in own}
+
+
+def unchecked_headings(schedule: Schedule, own: Mapping[str, object]) -> dict[str, float]:
+    """Return the fine-tuner's parameters of a schedule that has no time to drive to where the heading shows."""
+    return {name: value for name, value in _NO_HEADING_CHECKS.items() if schedule.at_once and name not in own}
