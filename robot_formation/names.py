@@ -87,6 +87,11 @@ def beacon_neighbour(robot: str) -> str:
     return LEADER if number == "1" else follower(int(number) - 1)
 
 
+def moved(robot: str) -> Topic:
+    """Realised displacement of a robot's move."""
+    return Topic(under(robot, MOVED.name), MOVED.type, MOVED.qos)
+
+
 def right_neighbour(robot: str) -> str:
     """Return the name of the follower on a robot's right, whether there is one or not."""
     return follower(1 if robot == LEADER else int(robot.removeprefix("follower_")) + 1)
@@ -163,13 +168,16 @@ def formation_done(robot: str, formation: str = FORMATION, *, listeners: tuple[s
 
 
 def formation_begun(robot: str, formation: str = FORMATION, *, listeners: tuple[str, ...] = ("world",)) -> Topic:
-    """The bare tick of a robot in the schedule `together`: the number of the timestep that it begins."""
+    """The bare tick of a robot in the schedule `together`: the number of the timestep that it begins.
+
+    0 says of a follower that it has finished its first alignment.
+    """
     return Topic(f"{formation}/{robot}/begun", "std_msgs/msg/UInt32", HISTORY, listeners)
 
 
-def formation_clock(formation: str = FORMATION) -> Topic:
-    """The world's clock, beside the formation's namespace, for the schedule `timer`."""
-    return Topic(f"{formation.rpartition('/')[0]}/clock", "rosgraph_msgs/msg/Clock", CLOCK)
+def formation_clock(home: str = "") -> Topic:
+    """The world's clock, for the schedule `timer`; `home` is the namespace in which world and robots lie."""
+    return Topic(absolute(home, CLOCK_TOPIC.name), "rosgraph_msgs/msg/Clock", CLOCK)
 
 
 SURFACE = Topic("surface", "visualization_msgs/msg/Marker", LATCHED)

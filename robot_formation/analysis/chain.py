@@ -16,6 +16,9 @@ from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.json_values import JsonObject
 from robot_formation.names import LEADER, beacon_neighbour
 
+_SAME = 1e-6
+"""Sums of moves that differ by less than this are equal, metres and radians."""
+
 
 def pose(record: RunRecord, robot: str, stamp_ns: int) -> Motion | None:
     """Return a robot's true pose at a stamp, if it is known."""
@@ -24,16 +27,48 @@ def pose(record: RunRecord, robot: str, stamp_ns: int) -> Motion | None:
 
 
 def pose_at_end(record: RunRecord, robot: str, timestep: int) -> Motion | None:
-    """Return a robot's true pose at the end of a timestep, 0 and before: at the start; None if it isn't known."""
+    """Return a robot's true pose at the end of a timestep, if it is known; 0 and before: after the first alignment."""
     track = record.tracks.get(robot)
     if track is None or not len(track.stamps_ns):
         return None
+    follower = next((found for found in record.followers if found.name == robot), None)
     if timestep <= 0:
-        return track.at(int(track.stamps_ns[0]))
-    ends = record.leader_moved
-    if robot != LEADER:
-        ends = next((found.displacements for found in record.followers if found.name == robot), ())
+        moves = moves_of_timestep(record, follower, 1) if follower is not None and follower.displacements else []
+        aligned = follower is not None and moves and moves[0] > 0
+        start_ns = follower.moved[moves[0] - 1].stamp_ns if follower is not None and aligned else track.stamps_ns[0]
+        return track.at(int(start_ns))
+    ends = record.leader_moved if follower is None else follower.displacements
     return track.at(ends[timestep - 1].stamp_ns) if timestep <= len(ends) else None
+
+
+def moves_of_timestep(record: RunRecord, follower: FollowerRecord, t: int) -> list[int]:
+    """List the numbers of the moves of timestep t: from the displacement before to the t-th, if that exists.
+
+    The first timestep's are those after the leader's first move; or, where robots move at the same time, the last ones
+    that sum up to the displacement: before them come those of the first alignment.
+    """
+    if t > 1:
+        start_ns: float = follower.displacements[t - 2].stamp_ns
+    else:
+        start_ns = record.leader_moved[0].stamp_ns if record.leader_moved else math.inf
+    end_ns = follower.displacements[t - 1].stamp_ns if t <= len(follower.displacements) else math.inf
+    found = [index for index, move in enumerate(follower.moved) if start_ns < move.stamp_ns <= end_ns]
+    if t > 1 or not follower.displacements or _sums_up(follower, found):
+        return found
+    until = [index for index, move in enumerate(follower.moved) if move.stamp_ns <= end_ns]
+    endings = (until[first:] for first in range(len(until) - 1, -1, -1))
+    return next((moves for moves in endings if _sums_up(follower, moves)), found)
+
+
+def _sums_up(follower: FollowerRecord, moves: Sequence[int]) -> bool:
+    """Whether moves make the first displacement."""
+    total = Motion()
+    for index in moves:
+        if follower.moved[index].motion.finite:
+            total = total.then(follower.moved[index].motion)
+    said = follower.displacements[0].motion
+    parts = (total.x_m - said.x_m, total.y_m - said.y_m, total.yaw_rad - said.yaw_rad)
+    return bool(moves) and all(abs(part) < _SAME for part in parts)
 
 
 def chain_totals(record: RunRecord, follower: FollowerRecord, errors_m: Sequence[float | None]) -> JsonObject:

@@ -24,8 +24,11 @@ def conditions(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, obje
         "marker": _word(world.get("marker.kind")),
         "followers": len(robots) - 1 if isinstance(robots, (list, tuple)) and robots else None,
         "drive_mode": _word(world.get("motor.drive_mode")),
-        "schedule": _word(fine_tuner.get("schedule")),
-        "spacing": _word(fine_tuner.get("spacing")),
+        **{
+            name: found
+            for name, usual in (("schedule", "turns"), ("spacing", "rigid"))
+            if (found := _word(fine_tuner.get(name))) not in (None, usual)
+        },
     }
 
 

@@ -34,12 +34,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.analysis.chain import chain_totals, pose, pose_at_end
+from robot_formation.analysis.chain import chain_totals, moves_of_timestep, pose, pose_at_end
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.moves import Moves, is_blind, move_totals, movements_of, moves_of
 from robot_formation.analysis.quantiles import ELLIPSE_90, NORMAL_90
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
-from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.json_values import JsonObject
 from robot_formation.names import beacon_neighbour
@@ -160,7 +159,7 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
     timesteps = tuple(_timestep(record, follower, t) for t in range(1, finished + 1))
     unfinished = None
     if opened > finished:
-        indices = _moves(record, follower, finished + 1)
+        indices = moves_of_timestep(record, follower, finished + 1)
         unfinished = corrections_of(follower, indices)
     values = totals(timesteps)
     counts = [timestep.corrections.movements for timestep in timesteps]
@@ -269,7 +268,7 @@ def _timestep(record: RunRecord, follower: FollowerRecord, t: int) -> Timestep:
     left = follower.residuals[t - 1] if t <= len(follower.residuals) else None
     forecast = follower.predictions[t - 2] if 2 <= t <= len(follower.predictions) + 1 else None
     error_uv, heading_error = _ground_truth(record, follower, t)
-    indices = _moves(record, follower, t)
+    indices = moves_of_timestep(record, follower, t)
     return Timestep(
         t=t,
         predicted=forecast.motion if forecast and forecast.motion.finite else None,
@@ -283,22 +282,6 @@ def _timestep(record: RunRecord, follower: FollowerRecord, t: int) -> Timestep:
         error_uv_m=error_uv,
         heading_error_rad=heading_error,
     )
-
-
-def _moves(record: RunRecord, follower: FollowerRecord, t: int) -> list[int]:
-    """Find the moves of timestep t: from the displacement before to the t-th, if that exists."""
-    start_ns = follower.displacements[t - 2].stamp_ns if t > 1 else _first_begun_ns(record, follower)
-    end_ns = follower.displacements[t - 1].stamp_ns if t <= len(follower.displacements) else math.inf
-    return [index for index, move in enumerate(follower.moved) if start_ns < move.stamp_ns <= end_ns]
-
-
-def _first_begun_ns(record: RunRecord, follower: FollowerRecord) -> int:
-    """Return when a follower's first timestep began: when it said so, else with the end of the leader's first move."""
-    for text, stamp_ns in zip(follower.states, follower.state_stamps_ns, strict=False):
-        state = AlignmentState.parse(text)
-        if state is not None and state.opens_timestep:
-            return min(stamp_ns, record.leader_moved[0].stamp_ns)
-    return record.leader_moved[0].stamp_ns
 
 
 def _ground_truth(

@@ -87,20 +87,22 @@ class AwaitedRobots:
         if not robot.active:
             robot.active = True
             robot.begun += 1
+            if self._schedule is Schedule.TOGETHER and robot.begun > 0:
+                self._allow(self._names, robot.begun)  # its tick may come later than its order
 
     def rests(self, name: str) -> None:
-        """A robot's motion has ended."""
-        robot = self._robots[name]
-        robot.moving = False
-        if name == self._leader and self._schedule is not Schedule.WAVE:
-            robot.active = False
+        """A robot's motion has ended; the next leg of its move may follow."""
+        self._robots[name].moving = False
 
     def looked(self, name: str) -> None:
         """A robot has got the frames that it has asked for."""
         self._robots[name].looking = False
 
     def idle(self, name: str) -> None:
-        """A robot has nothing more to do in its timestep; an order that is under way is of the next one then."""
+        """A robot has nothing more to do in its timestep (the leader: its move has ended).
+
+        An order that is under way is of the next one then.
+        """
         robot = self._robots[name]
         robot.active = robot.busy
         robot.begun += robot.busy

@@ -34,10 +34,13 @@ class Health:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a component runs: its robot ('' for the run's own nodes) and the namespace of the formation's ticks."""
+    """Where a component runs: its robot ('' for the run's own nodes), the namespace of the formation's ticks, and the
+    one in which world and robots lie ('': the root).
+    """
 
     robot: str
     formation: str = "/formation"
+    home: str = ""
 
     def frame(self, name: str) -> str:
         """Return the name of one of the robot's frames."""

@@ -40,7 +40,7 @@ class FineTunerComponent(Component):
     def __init__(self, parameters: FineTunerNodeParameters, place: Place) -> None:
         super().__init__(place)
         self._schedule = parameters.schedule
-        self._last = parameters.done_listeners == 1
+        self._last = parameters.done_listeners <= 1
         self._rule = StartRule(
             parameters.schedule,
             parameters.spacing,
@@ -75,7 +75,7 @@ class FineTunerComponent(Component):
     def _ticks(self) -> list[Input]:
         """List what it hears of other robots, or of time: never more than bare ticks of its neighbours."""
         if self._schedule is Schedule.TIMER:
-            return [Input(names.formation_clock(self.place.formation), self._on_clock)]
+            return [Input(names.formation_clock(self.place.home), self._on_clock)]
         left = names.formation_begun if self._schedule is Schedule.TOGETHER else names.formation_done
         heard = [Input(left(self._left, self.place.formation), self._on_left)]
         if self._schedule is not Schedule.TURNS and not self._last:

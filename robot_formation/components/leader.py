@@ -41,7 +41,7 @@ class LeaderComponent(Component):
             for name in self._leader.heard
         ]
         if self._schedule is Schedule.TIMER:
-            found.append(Input(names.formation_clock(self.place.formation), self._on_clock))
+            found.append(Input(names.formation_clock(self.place.home), self._on_clock))
         if self._driven:
             found.append(Input(names.CMD_VEL, lambda message: self._on_velocity(message.twist)))
             found.append(Input(names.CMD_VEL_UNSTAMPED, self._on_velocity))
@@ -97,6 +97,7 @@ class LeaderComponent(Component):
     def _on_moved(self, message: Message) -> None:
         self.stamp_ns = conversions.stamp_of(message)
         self._act(self._leader.moved())
+        self._act(self._leader.go())  # ticks, or the clock, may have been ahead of it
 
     def _on_done(self, follower: str, message: Message) -> None:
         self._act(self._leader.follower_done(follower, int(message.data)))

@@ -136,7 +136,7 @@ class FineTunerNodeParameters(FineTunerParameters):
         "What the place is; delayed: where it was one timestep earlier, with a schedule of moves at the same time",
     )
     period_s: float = period_parameter()
-    timesteps: int = parameter(20, "Timesteps of the run, for the schedule wave", low=1, high=100000)
+    timesteps: int = parameter(20, "Timesteps of the run, for the schedules wave and timer", low=1, high=100000)
     done_listeners: int = parameter(
         1,
         "Nodes that wait for this follower's tick: the leader, and the follower behind if there is one",

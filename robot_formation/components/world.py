@@ -31,7 +31,7 @@ class WorldComponent(Component):
     """Moves robots on `<robot>/joint_commands`, takes pictures on `<robot>/camera/request`, publishes what happens."""
 
     fixed: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("robots", "overhead.enabled"), "it decides on topics; start another world"
+        ("robots", "overhead.enabled", "schedule"), "it decides on topics; start another world"
     )
 
     def __init__(self, parameters: WorldNodeParameters, place: Place) -> None:
@@ -80,10 +80,11 @@ class WorldComponent(Component):
         topic = {Schedule.WAVE: names.formation_done, Schedule.TOGETHER: names.formation_begun}.get(
             self._parameters.schedule
         )
-        if topic is None:
-            return []
-        heard = self._parameters.robots
-        return [Input(topic(name, self.place.formation), partial(self._on_tick, name)) for name in heard]
+        robots = self._parameters.robots
+        heard = [Input(topic(name, self.place.formation), partial(self._on_tick, name)) for name in robots if topic]
+        if self._parameters.schedule.at_once:
+            heard.append(Input(names.moved(names.LEADER), lambda message: self._awaited.idle(names.LEADER)))
+        return heard
 
     def _on_tick(self, robot: str, message: Message) -> None:
         timestep = int(message.data)
@@ -140,6 +141,10 @@ class WorldComponent(Component):
     def work(self) -> None:
         """See `Component`: advances to the next instant that has something to publish."""
         self._tell(self._world.advance())
+        self._end_period()
+
+    def _end_period(self) -> None:
+        """With `timer`, begin the next timestep if it is time for it."""
         end_ns = self._awaited.period_end_ns
         if end_ns is not None and self._world.stamp_ns - self._world.start_ns >= end_ns:
             self._awaited.period_ended()
@@ -180,6 +185,8 @@ class WorldComponent(Component):
 
     def _on_reset(self) -> tuple[bool, str]:
         """Start again with the parameters set before; stamps go on at the next whole second."""
+        if self._parameters.schedule is Schedule.TIMER:
+            return False, "timesteps of the schedule timer are counted from the world's start: start the run again"
         old = self._world
         used = any(self._numbers.values()) or bool(self._moving)
         try:
@@ -205,7 +212,10 @@ class WorldComponent(Component):
             return False, "the world runs: call world/pause with true first"
         if not self._world.owes:
             return False, "nothing is owed: time stands still until a command or a request comes"
+        if self._awaited.any:
+            return False, f"{', '.join(self._awaited.names())} have to order something first"
         self._tell(self._world.step())
+        self._end_period()
         return True, f"{self.stamp_ns / 1e9:.6f} s"
 
     def _on_command(self, robot: str, message: Message) -> None:

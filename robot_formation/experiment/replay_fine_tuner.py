@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from robot_formation import conversions, names
+from robot_formation.bag.errors import BagError
 from robot_formation.experiment.recorded_run import Recording, equal, handlers, host
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
@@ -90,10 +91,15 @@ def replay_fine_tuner(recording: Recording, changes: JsonObject) -> list[FineTun
         changes: parameters of the fine-tuner that are to be others than recorded, by name.
 
     Raises:
-        BagError: the bag lacks a topic that is needed.
+        BagError: the bag lacks a topic that is needed, or is of a schedule without the neighbours' done ticks.
         ParameterError: a change can't be.
     """
     parameters = recording.parameters("fine_tuner", changes)
+    if parameters.schedule.at_once:
+        raise BagError(
+            f"a fine-tuner can't be replayed from a run by the schedule '{parameters.schedule}', whose "
+            "followers wait for no neighbour's tick; replay runs by turns or wave"
+        )
     return [_Driver(recording, robot, parameters).run() for robot in recording.followers]
 
 

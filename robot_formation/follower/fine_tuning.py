@@ -26,7 +26,7 @@ from robot_formation.vision.pixy2.block import Block
 _STILL_FRAMES, _STILL_PX = 10, 2
 """A robot stands still if its blocks have stayed within so many pixels for so many frames (at 5 cm/s: 7 px)."""
 _MORE_EXTENSIONS = 12
-"""Extensions of a look at a robot that moves: up to two seconds."""
+"""Extensions of a look at a robot that moves: up to four seconds at 30 frames per second."""
 _UNTOLD = (0.01**2, 0.0, 0.0, 0.0, 0.01**2, 0.0, 0.0, 0.0, 0.02**2)
 """Covariance of the neighbour's step about a command, which has the actuation bias in it: (x, y, yaw) in m and rad."""
 
@@ -205,7 +205,7 @@ class FineTuner:
         self._resent = 0
         self._blind_timesteps = blind_timesteps(parameters.blackouts)
         self._prediction: Motion | None = None
-        self._residual: Motion | None = None  # of the latest timestep that was seen
+        self._left: Motion | None = None  # the way to the place at the end of the last timestep, seen or forecast
         self._step: UncertainMotion | None = None  # the neighbour's next one, as forecast
         self._planned_move: Motion | None = None  # the prediction move, until it has ended
         self._actuation_error: Motion | None = None
@@ -357,7 +357,7 @@ class FineTuner:
 
     def _planned(self) -> Motion:
         if self.rule.delayed:  # the place where it was seen last
-            return Motion() if self.timestep == 1 or self._residual is None else self._residual
+            return Motion() if self.timestep == 1 or self._left is None else self._left
         if self.timestep == 1:
             return self._first_step
         if self.timestep <= COLLECTION_TIMESTEPS or self._prediction is None:
@@ -379,6 +379,8 @@ class FineTuner:
 
     def _still(self) -> bool:
         """Whether the neighbour seems to stand: its blocks are where they were some frames ago."""
+        if len(self._frames) < _STILL_FRAMES:
+            return False
         before, now = ({block.signature: block for block in self._frames[at]} for at in (-_STILL_FRAMES, -1))
         return all(
             abs(before[face].x - now[face].x) <= _STILL_PX and abs(before[face].height - now[face].height) <= _STILL_PX
@@ -411,7 +413,8 @@ class FineTuner:
 
     def _report(self, residual: UncertainMotion | None) -> list[Action]:
         self._phase = Phase.PREDICTION
-        self._residual = residual.mean if residual is not None else None
+        left = residual if residual is not None else self._alignment.ahead()
+        self._left = left.mean if left is not None and left.finite else None
         total = self._previous = self._displacement
         commanded = None
         if (error := self._actuation_error) is not None:

@@ -44,7 +44,7 @@ class Spacing(Choice):
 def period_parameter() -> Any:
     """Make the parameter of all nodes that need the period of `timer`; a step and a look take some three seconds."""
     text = "Period of the schedule timer; the first alignment and the collection phase take four per timestep"
-    return parameter(4.0, text, unit="s", low=0.1, high=1000.0)
+    return parameter(4.0, text, unit="s", low=2.0, high=1000.0)
 
 
 def check_spacing(schedule: Schedule, spacing: Spacing) -> None:

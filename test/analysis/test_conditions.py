@@ -6,7 +6,7 @@ from robot_formation.analysis.conditions import conditions, conditions_text, run
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
 
-COMMON = {"marker": "colours", "followers": 1, "drive_mode": "pwm_stop", "schedule": "turns", "spacing": "rigid"}
+COMMON = {"marker": "colours", "followers": 1, "drive_mode": "pwm_stop"}
 
 
 def test_conditions_come_out_of_what_a_run_says_of_itself() -> None:
@@ -23,8 +23,6 @@ def test_conditions_come_out_of_what_a_run_says_of_itself() -> None:
             "marker": "tags",
             "followers": 2,
             "drive_mode": "pwm_stop",
-            "schedule": "turns",
-            "spacing": "rigid",
             "in_process": True,
         },
     }

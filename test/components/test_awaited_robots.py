@@ -12,6 +12,7 @@ def test_nobody_is_awaited_in_turns() -> None:
     awaited = AwaitedRobots(Schedule.TURNS, ROBOTS, 5, 1.0)
     awaited.ordered("leader")
     awaited.rests("leader")
+    awaited.idle("leader")
     assert not awaited.any
     assert awaited.names() == []
 
@@ -63,8 +64,21 @@ def test_a_robot_that_begins_before_it_was_heard_to_end_has_begun_the_next_times
     awaited.begun("leader", 1)
     assert not awaited.any
     awaited.rests("leader")
+    assert awaited.names() == ["leader"]  # another leg may follow
+    awaited.ordered("leader")
+    awaited.rests("leader")
+    awaited.idle("leader")
     assert not awaited.any
     awaited.rests("follower_1")
+    assert awaited.names() == ["follower_1"]
+
+
+def test_the_others_are_awaited_if_the_leaders_order_comes_before_its_tick() -> None:
+    awaited = AwaitedRobots(Schedule.TOGETHER, ROBOTS[:2], 5, 1.0)
+    awaited.ordered("follower_1", frames=True)
+    awaited.looked("follower_1")
+    awaited.idle("follower_1")
+    awaited.ordered("leader")
     assert awaited.names() == ["follower_1"]
 
 
@@ -102,4 +116,5 @@ def test_nothing_is_awaited_after_the_last_timestep() -> None:
         awaited.period_ended()
     awaited.ordered("leader")
     awaited.rests("leader")
+    awaited.idle("leader")
     assert not awaited.any

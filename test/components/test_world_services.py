@@ -316,7 +316,7 @@ def test_a_run_ends_with_3_when_the_leader_drives_off_the_plate() -> None:
     assert "leader has left the plate" in result.reason
 
 
-@pytest.mark.parametrize(("track", "followers", "fits"), [("one", 3, True), ("one", 4, False), ("two", 2, False)])
+@pytest.mark.parametrize(("track", "followers", "fits"), [("one", 2, True), ("one", 3, False), ("two", 2, False)])
 def test_followers_that_would_start_beyond_the_plate_are_refused_before_anything_starts(
     track: str, followers: int, fits: bool
 ) -> None:
@@ -324,7 +324,7 @@ def test_followers_that_would_start_beyond_the_plate_are_refused_before_anything
     if fits:
         scenario.check()
         return
-    with pytest.raises(ValueError, match=rf"'follower_{followers}' can't start: .*take fewer followers"):
+    with pytest.raises(ValueError, match=rf"follower_{followers}'? (can't start|would stand).*take fewer followers"):
         scenario.check()
 
 

@@ -5,12 +5,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from robot_formation.analysis.chain import moves_of_timestep
 from robot_formation.analysis.quantities import RunAnalysis, analyse
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.errors import FormationError
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario, load, load_track, override, presets
+from robot_formation.geometry.se2 import Motion
 
 pytestmark = pytest.mark.xdist_group("schedules")
 
@@ -84,6 +86,37 @@ def test_delayed_places_lag_by_a_step_per_robot() -> None:
     tracks = record("schedule=timer", "spacing=delayed", "leader.timesteps=8").tracks
     ends = [tracks[robot].positions_m[-1, 1] for robot in ("leader", "follower_1", "follower_2")]
     assert np.allclose(np.diff(ends), -0.05, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ("schedule=together", "blackouts=[[2, 4]]", "leader.path=slalom", "leader.path_parameters=[step_m=0.03]"),
+        ("schedule=together", "fine_tuner.look.frames=5"),
+        ("schedule=timer", "leader.period_s=2.0"),
+    ],
+)
+def test_ticks_and_frames_may_be_early_late_or_few(settings: tuple[str, ...]) -> None:
+    found = analysed("followers=1", *settings)
+    assert found.followers[0].totals["timesteps_finished"] == 6
+
+
+def test_a_blind_follower_of_delayed_places_drives_on() -> None:
+    found = analysed(
+        "schedule=timer", "spacing=delayed", "blackouts=[[5, 2]]", "followers=1", "leader.timesteps=10"
+    ).followers[0]
+    assert found.totals["formation_error_max_m"] < 0.03
+
+
+def test_moves_of_the_first_alignment_are_not_of_the_first_timestep() -> None:
+    """In a wave the leader drives its first step while the second follower still aligns."""
+    found = record("schedule=wave", "fine_tuner.precise.placed_m=0", "leader.timesteps=3")
+    for follower in found.followers:
+        moves = moves_of_timestep(found, follower, 1)
+        total = Motion()
+        for index in moves:
+            total = total.then(follower.moved[index].motion)
+        assert np.hypot(total.x_m, total.y_m) == pytest.approx(0.05, abs=0.02)
 
 
 def test_rigid_places_have_no_lag() -> None:

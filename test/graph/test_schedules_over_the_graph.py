@@ -19,7 +19,12 @@ GROUND = (
     "followers=2",
     "leader.timesteps=4",
 )
-CASES = [("schedule=wave",), ("schedule=together",), ("schedule=timer", "spacing=delayed")]
+SLALOM = ("leader.path=slalom", "leader.path_parameters=[step_m=0.03, period=8]")
+CASES = [
+    ("schedule=wave",),
+    ("schedule=together", *SLALOM),  # its moves have two legs
+    ("schedule=timer", "spacing=delayed", *SLALOM),
+]
 
 
 def scenario(*settings: str) -> Scenario:

@@ -129,7 +129,7 @@ class Host:
                 f"{kind}: it belongs to a robot: give its name as namespace, --ros-args -r __ns:=/follower_1"
             )
         home = node.get_namespace().rpartition("/")[0] if entry.robots else node.get_namespace()
-        place = Place(robot if entry.robots else "", names.absolute(home, self._parameters.formation_namespace))
+        place = Place(robot if entry.robots else "", names.absolute(home, self._parameters.formation_namespace), home)
         self._pacer = Pacer(getattr(parameters, "real_time_factor", 0.0))
         self._component: Component = component_class(parameters, place)
         self._component.wall_clock = time.perf_counter
