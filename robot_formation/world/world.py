@@ -24,8 +24,8 @@ class World:
     """Robots on a surface, in steps of 1 / physics_hz.
 
     Time passes only in `advance`, and only while something is owed: a finite wheel motion, until wheels and body
-    rest, or camera frames that were requested. The same surface, starts, parameters, seed and calls give the same
-    events to the last bit.
+    rest; camera frames that were requested; or a time up to which it is to go on. The same surface, starts, parameters,
+    seed and calls give the same events to the last bit.
 
     Attributes:
         step_count: physics steps since the start.
