@@ -27,11 +27,11 @@ from leader_paths import PATHS, SURFACES, Task, print_table
 from robot_formation.analysis.quantities import FollowerAnalysis, analyse
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
-from robot_formation.batch.resumable_table import ResumableTable
 from robot_formation.cli.sweep import seeds
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
+from run_table import missing, open_table
 
 BLACKOUTS = {1: 18, 2: 23, 3: 30, 5: 38}
 """First blind timestep by length."""
@@ -106,25 +106,15 @@ def error(follower: FollowerAnalysis, timestep: int) -> tuple[float, float] | No
     return found[0] if found else None
 
 
-def open_table(folder: Path) -> ResumableTable[Row]:
-    """Return the table of a folder."""
-    return ResumableTable(folder / "runs.csv", Row, FormationError, "no table of this bench; choose another OUT")
-
-
 def carry_out(args: argparse.Namespace) -> int:
     """Run what is missing in the table."""
-    args.out.mkdir(parents=True, exist_ok=True)
-    table = open_table(args.out)
-    done = {row.task for row in table.read()} if table.path.exists() else set()
-    if not done:
-        table.rewrite(())
     chosen = [
         Task(path, args.surface, predictor, seed)
         for seed in seeds(args.seeds)
         for path in args.paths
         for predictor in args.predictors
     ]
-    tasks = [task for task in chosen if task not in done]
+    table, tasks = missing(args.out, Row, chosen)
     for task in {(task.path, task.seed): task for task in tasks}.values():
         build(task, args.set).check()
     rows = run_parallel(run_task, ((task, args.set) for task in tasks), args.jobs)
@@ -136,7 +126,7 @@ def carry_out(args: argparse.Namespace) -> int:
 def report(args: argparse.Namespace) -> int:
     """Print medians over the seeds, one line per path and predictor."""
     groups: dict[tuple[str, str, str], list[Row]] = {}
-    for row in open_table(args.out).read():
+    for row in open_table(args.out, Row).read():
         groups.setdefault((row.path, row.surface, row.predictor), []).append(row)
     print("Formation error [cm] at the end of blackouts of 1, 2, 3 and 5 timesteps; growth of its vector over three;")
     print("runs in which the follower was in its place again within three timesteps after these")

@@ -27,11 +27,10 @@ import numpy as np
 from robot_formation.analysis.quantities import analyse
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
-from robot_formation.batch.resumable_table import ResumableTable
 from robot_formation.cli.sweep import seeds
-from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
+from run_table import missing, open_table
 
 TIMESTEPS = 20
 PATHS: dict[str, tuple[str, ...]] = {
@@ -116,24 +115,14 @@ def run_task(task: Task) -> list[Row]:
     ]
 
 
-def open_table(folder: Path) -> ResumableTable[Row]:
-    """Return the table of a folder."""
-    return ResumableTable(folder / "runs.csv", Row, FormationError, "no table of this bench; choose another OUT")
-
-
 def carry_out(args: argparse.Namespace) -> int:
     """Run what is missing in the table."""
-    args.out.mkdir(parents=True, exist_ok=True)
-    table = open_table(args.out)
-    done = {row.task for row in table.read()} if table.path.exists() else set()
-    if not done:
-        table.rewrite(())
-    tasks = [
-        task
+    chosen = [
+        Task(path, schedule, followers, seed)
         for seed in seeds(args.seeds)
         for path, schedule, followers in itertools.product(args.paths, args.schedules, args.followers)
-        if (task := Task(path, schedule, followers, seed)) not in done
     ]
+    table, tasks = missing(args.out, Row, chosen)
     for rows in with_progress(run_parallel(run_task, ((task,) for task in tasks), args.jobs), len(tasks)):
         table.append(rows)
     return 0
@@ -156,7 +145,7 @@ def ratio(runs: Sequence[Sequence[Row]]) -> str:
 def report(args: argparse.Namespace) -> int:
     """Print the table."""
     grouped: dict[tuple[str, str, int], dict[int, list[Row]]] = {}
-    for row in open_table(args.out).read():
+    for row in open_table(args.out, Row).read():
         case = grouped.setdefault((row.path, row.schedule, row.followers), {})
         case.setdefault(row.seed, []).append(row)
     print("| path | schedule | N | runs | not done | error of follower 1, middle, N, cm | ratio per robot | "

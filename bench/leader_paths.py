@@ -37,7 +37,6 @@ from robot_formation.analysis.run_record import FollowerRecord
 from robot_formation.analysis.sweep_summary import median_with_interval
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
-from robot_formation.batch.resumable_table import ResumableTable
 from robot_formation.cli.sweep import seeds
 from robot_formation.components.predictor import PredictorComponent
 from robot_formation.errors import FormationError
@@ -49,6 +48,7 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import Ahead, Predictor
 from robot_formation.names import Message
 from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
+from run_table import missing, open_table
 
 TIMESTEPS = 60
 PATHS: dict[str, tuple[str, ...]] = {
@@ -253,28 +253,18 @@ def number(value: float | None) -> float | None:
 
 def carry_out(args: argparse.Namespace) -> int:
     """Run what is missing in the table."""
-    args.out.mkdir(parents=True, exist_ok=True)
-    table = open_table(args.out)
-    done = {row.task for row in table.read()} if table.path.exists() else set()
-    if not done:
-        table.rewrite(())
     chosen = [
         Task(path, surface, predictor, seed)
         for seed in seeds(args.seeds)
         for path, surface, predictor in itertools.product(args.paths, args.surfaces, args.predictors)
     ]
-    tasks = [task for task in chosen if task not in done]
+    table, tasks = missing(args.out, Row, chosen)
     for task in {(task.path, task.surface, task.seed): task for task in tasks}.values():
         build(task, args.set).check()
     rows = run_parallel(run_task, ((task, args.set) for task in tasks), args.jobs)
     for row in with_progress(rows, len(tasks)):
         table.append([row])
     return 0
-
-
-def open_table(folder: Path) -> ResumableTable[Row]:
-    """Return the table of a folder."""
-    return ResumableTable(folder / "runs.csv", Row, FormationError, "no table of this bench; choose another OUT")
 
 
 Runs = dict[tuple[str, str], dict[str, dict[int, Row]]]
@@ -332,7 +322,7 @@ def print_table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
 
 def report(args: argparse.Namespace) -> int:
     """Print what the table says."""
-    runs = grouped(list(open_table(args.out).read()))
+    runs = grouped(list(open_table(args.out, Row).read()))
     predictors = list(dict.fromkeys(name for found in runs.values() for name in found))
     print("Correction distance from timestep 4 on [cm]: median over seeds, 95 % interval of the median")
     print_table(
@@ -405,7 +395,7 @@ def lost_runs(runs: Mapping[int, Row]) -> int:
 
 def figure(args: argparse.Namespace) -> int:
     """Draw the medians of the correction distance per timestep, one panel per surface."""
-    runs = grouped(list(open_table(args.out).read()))
+    runs = grouped(list(open_table(args.out, Row).read()))
     surfaces = list(dict.fromkeys(surface for _, surface in runs))
     paths = [name for name in PATHS if any(path == name for path, _ in runs)]
     sheet = new_figure(4.2 * len(surfaces) + 2.0, 0.36 * len(paths) + 1.8)

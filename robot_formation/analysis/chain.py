@@ -1,4 +1,4 @@
-"""Where robots of a chain stand: poses at the end of timesteps, errors against the leader, lag and gaps.
+"""Where robots of a chain stand: poses at the end of timesteps, errors against the leader, and lag.
 
 The leader's place of follower n is n times the formation distance to the leader's right; with delayed spacing where
 that was n timesteps ago, since each robot keeps its place beside where its neighbour stood one timestep earlier.

@@ -290,8 +290,7 @@ def _ground_truth(
     """Return the formation error (u, v) in metres and the heading error in radians of timestep t, where known."""
     neighbour = beacon_neighbour(follower.name)
     stamp_ns = follower.displacements[t - 1].stamp_ns
-    own = record.tracks.get(follower.name)
-    pose_f = own.at(stamp_ns) if own else None
+    pose_f = pose(record, follower.name, stamp_ns)
     pose_b = pose_at_end(record, neighbour, t - 1) if record.delayed else pose(record, neighbour, stamp_ns)
     if pose_f is None or pose_b is None:
         return None, None

@@ -67,7 +67,7 @@ def clock(stamp_ns: int) -> Clock:
 
 def read_clock(message: Clock) -> int:
     """Return a /clock message's time, nanoseconds."""
-    return int(message.clock.sec) * 10**9 + int(message.clock.nanosec)
+    return to_ns(message.clock)
 
 
 def uint32(value: int) -> UInt32:

@@ -6,7 +6,7 @@ import json
 from collections import defaultdict
 from collections.abc import Callable
 
-from robot_formation import exit_codes, names
+from robot_formation import conversions, exit_codes, names
 from robot_formation.analysis.from_bag import record_of, run_topics
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.experiment.in_process import InProcessRun
@@ -38,7 +38,7 @@ def run_in_memory(
     def listen(topic: str, message: Message) -> None:
         nonlocal now_ns
         if topic == clock:
-            now_ns = message.clock.sec * 10**9 + message.clock.nanosec
+            now_ns = conversions.read_clock(message)
         elif topic in wanted:
             messages[topic].append(message)
             stamps[topic].append(now_ns)
