@@ -63,7 +63,7 @@ def add_parser(subparsers: Subparsers) -> None:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--track", metavar="NAME", help="preset track whose robots are measured: one, two (default), ...")
-    what.add_argument("--scenario", metavar="FILE", type=Path, help="scenario file whose robots are measured")
+    what.add_argument("--scenario", metavar="FILE", type=Path, help="scenario (file or name) whose robots are measured")
     parser.add_argument("--seed", metavar="N", type=whole_number, help="seed that the robots are drawn from")
     parser.add_argument("--surface", metavar="NAME", default="plane", help="ground to measure on (default: plane)")
     parser.add_argument(

@@ -6,21 +6,27 @@ import argparse
 import json
 import shutil
 import textwrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robot_formation.cli.parser import Subparsers
 from robot_formation.parameters import specs
+
+if TYPE_CHECKING:
+    from robot_formation.experiment.scenario import Scenario
 
 
 def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser(
         "list",
-        help="list tracks, paths, surfaces, predictors and robots",
+        help="list tracks, scenarios, paths, surfaces, predictors and robots",
         description="List what can be named in other verbs.",
     )
     parser.add_argument(
-        "what", nargs="?", choices=("tracks", "paths", "surfaces", "predictors", "robots"), help="only these"
+        "what",
+        nargs="?",
+        choices=("tracks", "scenarios", "paths", "surfaces", "predictors", "robots"),
+        help="only these",
     )
     parser.add_argument("--json", action="store_true", help="machine-readable, on standard output")
     parser.set_defaults(run=run)
@@ -66,6 +72,7 @@ def collect() -> dict[str, dict[str, str]]:
         )
     return {
         "tracks": tracks,
+        "scenarios": {name: _formation(scenario.load(path)) for name, path in scenario.formations().items()},
         "paths": {name: f"{_first_line(kind)} {_parameters(kind)}".strip() for name, kind in PATHS.items()},
         "surfaces": {name: _first_line(kind) for name, kind in SURFACES.items()},
         "predictors": DESCRIPTIONS,
@@ -74,6 +81,15 @@ def collect() -> dict[str, dict[str, str]]:
             "follower_1": "keeps 32 cm to the right of the leader; --set followers=N adds follower_2 .. follower_N",
         },
     }
+
+
+def _formation(scenario: Scenario) -> str:
+    """Describe a scenario of a formation."""
+    setup, leader = scenario.setup, scenario.leader
+    return (
+        f"{setup.followers} followers, schedule {setup.schedule}, spacing {setup.spacing}; {leader.timesteps} "
+        f"timesteps on a plate of {scenario.plate_m:g} x {scenario.plate_m:g} m"
+    )
 
 
 def _parameters(kind: type) -> str:

@@ -36,7 +36,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("run", help="run a scenario, record and analyse it", description=DESCRIPTION)
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--track", metavar="NAME", help="preset track: one, two (default), ... (see 'formation list')")
-    what.add_argument("--scenario", metavar="FILE", type=Path, help="YAML file like those in config/scenarios")
+    what.add_argument("--scenario", metavar="FILE", type=Path, help="file or name, see 'formation list scenarios'")
     parser.add_argument(
         "--predictor",
         metavar="NAME",
@@ -157,6 +157,7 @@ def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation
     """Run the scenario in the way that the options ask for."""
     from robot_formation.calibration.camera_check import describe_camera
     from robot_formation.calibration.drive_check import describe_curves
+    from robot_formation.experiment.overhead_defaults import LARGEST_M
 
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
@@ -164,6 +165,8 @@ def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation
     say(describe_curves(scenario.drive))
     if camera := describe_camera(scenario.fine_tuner):
         say(camera)
+    if scenario.too_large_for_overhead:
+        say(f"overhead camera: off, for the plate is larger than {LARGEST_M:g} m; world.overhead.* arranges one")
     if args.in_process:
         from robot_formation.experiment.in_process import run_in_process
         from robot_formation.launching.processes import run_metadata

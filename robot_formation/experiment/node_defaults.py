@@ -57,5 +57,5 @@ def read_scenario_yaml(path: Path) -> object:
     Raises:
         ScenarioError: if it can't be read.
     """
-    remedy = "give a scenario's YAML file, like those in config/scenarios"
+    remedy = "give a scenario's YAML file, or a name of 'formation list scenarios'"
     return read_yaml(path, refuse=ScenarioError, remedy=remedy)

@@ -22,6 +22,11 @@ from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.chain_defaults import backdrop, unchecked_headings
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
+from robot_formation.experiment.overhead_defaults import (
+    overhead_calibrations,
+    overhead_camera,
+    too_large_for_overhead,
+)
 from robot_formation.experiment.path_check import PathCheck
 from robot_formation.experiment.path_plan import (
     KNOWN_STEP,
@@ -49,6 +54,7 @@ from robot_formation.parameters import (
 from robot_formation.paths import config_dir
 from robot_formation.schedule.schedules import Schedule, Spacing, check_spacing
 from robot_formation.surface import SURFACES, plate_size
+from robot_formation.surface.base import PLATE_SIZE_M
 from robot_formation.system.yaml_files import YamlError, parse_yaml
 from robot_formation.vision.marker import MarkerKind
 
@@ -217,6 +223,11 @@ class Scenario:
         return any(path.motion(timestep).yaw_rad for timestep in range(1, self.leader.timesteps + 1))
 
     @property
+    def too_large_for_overhead(self) -> bool:
+        """Whether nothing looks from above because the plate is too large for it."""
+        return too_large_for_overhead(self.plate_m, self.settings.get("world", {}))
+
+    @property
     def plate_m(self) -> float:
         """Edge of the square plate."""
         return plate_size(self.world.surface, self.world.surface_parameters)
@@ -261,10 +272,12 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         start_x_m=setup.start_x_m if "start_x_m" in given else x_m,
         start_y_m=setup.start_y_m if "start_y_m" in given else y_m,
     )
-    boards = backdrop(setup.followers, settings.get("world", {}))
-    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m), **timed, **boards)
-    own = settings.get("overhead_tracker", {})
-    known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
+    own, size_m = settings.get("world", {}), _plate_size(ground)
+    follows = {**backdrop(setup.followers, own), **overhead_camera(size_m, own)}
+    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m), **timed, **follows)
+    tracker = settings.get("overhead_tracker", {})
+    known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in tracker}
+    known |= overhead_calibrations(size_m, own, tracker)
     bounds = prediction_bounds(leader, distance_m, ground)
     bounds = {name: value for name, value in bounds.items() if name not in settings.get("fine_tuner", {})}
     first = {kind: known_step(kind, leader, 1, distance_m, settings.get(kind, {})) for kind in KNOWN_STEP}
@@ -289,6 +302,14 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         ),
         with_room(leader, world, setup.followers, distance_m),
     )
+
+
+def _plate_size(ground: WorldNodeParameters) -> float:
+    """Edge of the plate; of the paper's if the surface can't be made, which `Scenario.check` tells."""
+    try:
+        return plate_size(ground.surface, ground.surface_parameters)
+    except ParameterError:
+        return PLATE_SIZE_M
 
 
 _KNOWN_FROM_ABOVE = ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters")
@@ -322,6 +343,11 @@ def track_names() -> list[str]:
     return [name.removeprefix("track_") for name in presets() if name.startswith("track_")]
 
 
+def formations() -> dict[str, Path]:
+    """List the presets that are no tracks, by name: formations of several followers."""
+    return {name: path for name, path in presets().items() if not name.startswith("track_")}
+
+
 def load_track(track: str) -> Scenario:
     """Load a preset track by its short name.
 
@@ -334,12 +360,13 @@ def load_track(track: str) -> Scenario:
 
 
 def load(path: Path) -> Scenario:
-    """Read a scenario file.
+    """Read a scenario file, or the preset of that name where there is no such file.
 
     Raises:
         ScenarioError: if it can't be read or isn't a mapping.
         ParameterError: on unknown or wrong entries.
     """
+    path = path if path.exists() else presets().get(str(path), path)
     content = read_scenario_yaml(path)
     if not isinstance(content, Mapping):
         raise ScenarioError(

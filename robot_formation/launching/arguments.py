@@ -11,9 +11,11 @@ from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.network.loopback import PROFILES, RANGE, use_loopback
 from robot_formation.paths import config_dir
+from robot_formation.schedule.schedules import Schedule
 from robot_formation.system.yaml_files import Yaml, read_yaml
 from robot_formation.world.parameters import CameraMode
 
+_SCHEDULES = tuple(schedule.value for schedule in Schedule)
 _CAMERA_MODES = tuple(mode.value for mode in CameraMode)
 _SWITCH = ("true", "false", "True", "False", "1", "0")
 _OPENING, _CLOSING = "[{", "]}"
@@ -31,10 +33,13 @@ class Argument:
 
 ARGUMENTS = {
     "track": Argument("two", "preset track: see 'formation list tracks'"),
-    "scenario": Argument("", "scenario file, instead of a track"),
+    "scenario": Argument("", "scenario file or name, instead of a track: see 'formation list scenarios'"),
     "path": Argument("", "the leader's path: see 'formation list paths'; empty: the scenario's"),
     "surface": Argument("", "surface: see 'formation list surfaces'; empty: the scenario's"),
     "predictor": Argument("", "predictor: see 'formation list predictors'; empty: the scenario's"),
+    "schedule": Argument(
+        "", f"{', '.join(_SCHEDULES[:-1])} or {_SCHEDULES[-1]}; empty: the scenario's", ("", *_SCHEDULES)
+    ),
     "seed": Argument("", "seed of every random stream; empty: the scenario's"),
     "camera": Argument("", f"{' or '.join(_CAMERA_MODES)}; empty: the scenario's", ("", *_CAMERA_MODES)),
     "real_time_factor": Argument("", "0: as fast as possible, 1: real time; empty: the scenario's"),
@@ -64,6 +69,7 @@ def scenario_of(values: Mapping[str, str]) -> Scenario:
     for name, key in (
         ("path", "leader.path"),
         ("predictor", "predictor.name"),
+        ("schedule", "schedule"),
         ("seed", "seed"),
         ("camera", "world.camera.mode"),
         ("real_time_factor", "world.real_time_factor"),

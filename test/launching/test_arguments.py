@@ -46,9 +46,17 @@ def test_a_list_with_spaces_arrives_in_the_scenario() -> None:
     assert found.setup.followers == 2
 
 
+def test_a_preset_is_found_by_name_and_the_schedule_has_an_argument() -> None:
+    found = scenario(scenario="line_of_five", schedule="wave")
+    assert found.setup.name == "line_of_five"
+    assert found.setup.schedule == "wave"
+
+
 @pytest.mark.parametrize(
     ("name", "value", "says"),
     [
+        ("scenario", "line_of_six", "formation list scenarios"),
+        ("schedule", "waves", "schedule:= can't be 'waves'"),
         ("predictor", "foo", "predictor:= can't be 'foo'"),
         ("seed", "x", "seed:="),
         ("real_time_factor", "fast", "real_time_factor:="),
