@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robot_formation.surface import Surface
 from robot_formation.world.parameters import CameraParameters, WorldParameters
 from robot_formation.world.pose import Pose
-from robot_formation.world.scene import FULL, Scene
+from robot_formation.world.scene import FULL, RobotFaces, Scene
 
 RenderedPicture = NDArray[np.uint8]
 """What a robot's camera gives: RGB (rows, columns, 3) of the size that the camera's parameters say."""
@@ -43,6 +43,7 @@ class Camera:
         self._canvas = np.empty((p.height_px * SUPERSAMPLING, p.width_px * SUPERSAMPLING, 3), np.uint16)
         self._blurred = np.empty((p.height_px, p.width_px, 3), np.float32)
         self._bounds = _view_bounds(p)
+        self._unit_bounds = self._bounds / np.linalg.norm(self._bounds, axis=1, keepdims=True)
 
     def optical_frame(self, robot: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotation (3, 3) from the world to the optical frame (x right, y down, z ahead) and the lens's place (3,)."""
@@ -56,6 +57,17 @@ class Camera:
         p = self.parameters
         return np.asarray(local[:, :2] / local[:, 2:] * p.focal_length_px + np.array([p.centre_x_px, p.centre_y_px]))
 
+    def may_see(self, robot: Pose, others: Sequence[Pose]) -> list[Pose]:
+        """List those of other robots of which something may be in a robot's view; the picture is of no others."""
+        rotation, lens = self.optical_frame(robot)
+        radius = self._scene.robot_radius_m
+        found = []
+        for other in others:
+            middle = rotation @ (other.matrix() @ self._scene.robot_middle + other.position - lens)
+            if middle[2] > self.parameters.near_m - radius and (self._unit_bounds @ middle).min() > -radius:
+                found.append(other)
+        return found
+
     def light(self, robot: Pose, others: Sequence[Pose]) -> Light:
         """Light on the sensor, uint16 (rows, columns, 3) red, green, blue, of a robot that sees robots at `others`.
 
@@ -66,9 +78,9 @@ class Camera:
         canvas = self._canvas
         canvas[:] = np.asarray(self._scene.wall_light * FULL, np.uint16)
         self._draw_plate(lens, rotation)
-        for other in sorted(others, key=lambda pose: -float(np.sum((np.asarray(pose.position) - lens) ** 2))):
-            for world_corners, colour in self._scene.robot_faces(other, lens):
-                self._fill((world_corners - lens) @ rotation.T, colour)
+        seen = self.may_see(robot, others)
+        for other in sorted(seen, key=lambda pose: -float(np.sum((np.asarray(pose.position) - lens) ** 2))):
+            self._draw_robot(self._scene.robot_faces(other, lens), lens, rotation)
         small: Light = np.asarray(
             cv2.resize(canvas, (p.width_px, p.height_px), interpolation=cv2.INTER_AREA), np.uint16
         )
@@ -98,6 +110,18 @@ class Camera:
                 cv2.fillConvexPoly(self._canvas, outline[index], colour, lineType=cv2.LINE_8, shift=SHIFT)
             else:
                 self._fill(local[corners[index]], colour)
+
+    def _draw_robot(self, faces: RobotFaces, lens: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
+        local = (faces.corners - lens) @ rotation.T
+        ahead = len(local) > 0 and local[:, 2].min() >= self.parameters.near_m
+        corners = self._on_canvas(local) if ahead else local
+        first = 0
+        for last, colour in zip(faces.ends, faces.colours, strict=True):
+            if ahead:
+                cv2.fillConvexPoly(self._canvas, corners[first:last], colour, lineType=cv2.LINE_8, shift=SHIFT)
+            else:
+                self._fill(local[first:last], colour)
+            first = last
 
     def _fill(self, corners: NDArray[np.float64], colour: tuple[float, float, float]) -> None:
         """Draw a convex polygon (n, 3) of the optical frame in linear light."""

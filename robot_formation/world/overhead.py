@@ -106,11 +106,10 @@ class OverheadCamera:
         # Far outside the picture the lens model is not defined.
         if z > -_NEAREST_M or math.hypot(x, y) > -z * self._widest:
             return _Outlines(np.empty((0, 2)), np.empty((0, 2), np.int32), [], [], distance)
-        faces = list(self._scene.robot_faces(robot, self._lens))
-        corners = self.project(np.concatenate([face for face, _ in faces]))
-        ends = np.cumsum([len(face) for face, _ in faces]).tolist()
-        levels = [self._level(colour) for _, colour in faces]
-        return _Outlines(corners, _on_canvas(corners), ends, levels, distance)
+        faces = self._scene.robot_faces(robot, self._lens)
+        corners = self.project(faces.corners)
+        levels = [self._level(colour) for colour in faces.colours]
+        return _Outlines(corners, _on_canvas(corners), faces.ends, levels, distance)
 
     def _draw_part(self, corners: NDArray[np.float64], robots: Sequence[_Outlines]) -> None:
         """Draw the part of the picture that holds these corners anew, with all robots, far to near."""

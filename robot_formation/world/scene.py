@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,6 @@ from robot_formation.world.tag_faces import FACES, tag_rectangles
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
-ShadedPolygon = tuple[Array, Colour]
-"""Corners (n, 3) in the world, metres, and linear light."""
 
 FULL = 65535.0
 """Linear light 1 in the 16-bit drawing."""
@@ -35,6 +33,20 @@ _SIDES: tuple[tuple[tuple[int, int, int, int], tuple[float, float, float]], ...]
 """Corner indices and normals: front, rear, left, right, top (the bottom is never seen)."""
 
 
+class RobotFaces(NamedTuple):
+    """Convex faces of a robot.
+
+    Attributes:
+        corners: corners of all faces in the world, one face after the other, (n, 3), metres.
+        ends: where the corners of each face end.
+        colours: linear light of each face.
+    """
+
+    corners: Array
+    ends: list[int]
+    colours: list[Colour]
+
+
 class Scene:
     """Faces to draw, with ambient light and one lamp (Lambert); light is linear, 65535 is white where fully lit.
 
@@ -43,6 +55,8 @@ class Scene:
         plate_points: corners of the plate's patches in the world, (n, 3), metres.
         patch_corners: indices of each patch's four corners, (patches, 4).
         patch_light: red, green, blue of each patch.
+        robot_middle: in the middle of a robot, (3,) in its base_link frame.
+        robot_radius_m: farthest from there that any of its faces reaches.
     """
 
     def __init__(self, surface: Surface, parameters: WorldParameters) -> None:
@@ -70,6 +84,7 @@ class Scene:
         around = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
         dot = np.stack([np.cos(around), np.sin(around), np.zeros(16)], axis=1) * marker.dot_radius_m
         self._add_face(dot + np.array([0.0, 0.0, marker.top_m]), np.array([0.0, 0.0, 1.0]), marker.dot_rgb)
+        self._stack_faces()
         self._make_plate(surface, camera.plate_patches, camera.plate_albedo)
 
     def _add_box(
@@ -81,6 +96,16 @@ class Scene:
 
     def _add_face(self, corners: Array, normal: Array, colour: tuple[int, ...]) -> None:
         self._faces.append((corners, normal, np.array(colour) / 255.0))
+
+    def _stack_faces(self) -> None:
+        """Put all faces into arrays, to be turned and lit at once."""
+        self._counts = np.array([len(corners) for corners, _, _ in self._faces])
+        self._corners = np.concatenate([corners for corners, _, _ in self._faces])
+        self._normals = np.stack([normal for _, normal, _ in self._faces])
+        self._albedos = np.stack([albedo for _, _, albedo in self._faces])
+        self._heights = np.array([normal @ corners[0] for corners, normal, _ in self._faces])
+        self.robot_middle = 0.5 * (self._corners.min(axis=0) + self._corners.max(axis=0))
+        self.robot_radius_m = float(np.linalg.norm(self._corners - self.robot_middle, axis=1).max())
 
     def _make_plate(self, surface: Surface, patches: int, albedo: int) -> None:
         edge = np.linspace(0.0, surface.size_m, patches + 1)
@@ -101,15 +126,19 @@ class Scene:
 
     def _shade(self, normal: Array, albedo: Array) -> Colour:
         """Linear light of a face in 16-bit units."""
-        light = self._ambient + (1.0 - self._ambient) * max(0.0, float(normal @ self._lamp))
-        r, g, b = albedo * (light * FULL)
-        return (float(r), float(g), float(b))
+        r, g, b = self._lit(normal[None], albedo[None])[0].tolist()
+        return (r, g, b)
 
-    def robot_faces(self, robot: Pose, lens: Array) -> Iterator[ShadedPolygon]:
-        """Faces of a robot that are turned to the lens, in the world frame, in drawing order: body, post, marker."""
-        rotation = robot.matrix()
-        position = np.asarray(robot.position)
+    def _lit(self, normals: Array, albedos: Array) -> Array:
+        """Linear light (n, 3) of faces in 16-bit units, by their normals (n, 3) in the world and albedos (n, 3)."""
+        light = self._ambient + (1.0 - self._ambient) * np.maximum(0.0, normals @ self._lamp)
+        return np.asarray(albedos * (light * FULL)[:, None])
+
+    def robot_faces(self, robot: Pose, lens: Array) -> RobotFaces:
+        """Faces of a robot that are turned to the lens, in drawing order: body, post, marker."""
+        rotation, position = robot.matrix(), np.asarray(robot.position)
         eye = rotation.T @ (lens - position)
-        for corners, normal, albedo in self._faces:
-            if float(normal @ (eye - corners[0])) > 0.0:
-                yield corners @ rotation.T + position, self._shade(rotation @ normal, albedo)
+        turned = self._normals @ eye > self._heights
+        corners = self._corners[np.repeat(turned, self._counts)] @ rotation.T + position
+        light = self._lit(self._normals[turned] @ rotation.T, self._albedos[turned])
+        return RobotFaces(corners, np.cumsum(self._counts[turned]).tolist(), [(r, g, b) for r, g, b in light.tolist()])

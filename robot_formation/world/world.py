@@ -238,13 +238,13 @@ class World:
         return frames
 
     def _take_picture(self, name: str) -> RenderedPicture:
-        poses = {other: robot.body.pose() for other, robot in self._robots.items()}
-        key = tuple(poses.values())
+        own = self._robots[name].body.pose()
+        seen = self._camera.may_see(own, [robot.body.pose() for other, robot in self._robots.items() if other != name])
+        key = (own, *seen)
         sensor = self._sensors[name]
         cached = self._pictures.get(name)
         if cached is None or cached[0] != key:
-            light = self._camera.light(poses[name], [pose for other, pose in poses.items() if other != name])
-            cached = (key, sensor.develop(light))
+            cached = (key, sensor.develop(self._camera.light(own, seen)))
             self._pictures[name] = cached
         return sensor.expose(cached[1], self.step_count / self.parameters.physics_hz)
 
