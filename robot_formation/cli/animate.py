@@ -85,7 +85,13 @@ def run(args: argparse.Namespace) -> int:
         warn(f"{args.bag} doesn't tell the world's parameters: the camera's pictures are rendered by the defaults")
     size_bytes, (width, height) = made.path.stat().st_size, made.size
     if args.json:
-        said = {"file": str(made.path), "pictures": made.pictures, "width_px": width, "height_px": height, "fps": args.fps}
+        said = {
+            "file": str(made.path),
+            "pictures": made.pictures,
+            "width_px": width,
+            "height_px": height,
+            "fps": args.fps,
+        }
         print(json.dumps({**said, "every_s": made.every_s, "rendered": made.rendered, "size_bytes": size_bytes}))
     else:
         pictures = f"{made.pictures} picture{'' if made.pictures == 1 else 's'}"

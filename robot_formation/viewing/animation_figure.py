@@ -39,13 +39,12 @@ class AnimationFigure:
             camera: that of the follower that is looked at.
             width_px: width of the pictures; even, as films need it.
         """
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
 
         self._scene, self._camera = scene, camera
         self.size = width_px, 2 * round(width_px * HEIGHT_IN / WIDTH_IN / 2)
         figure = Figure(figsize=(WIDTH_IN, self.size[1] * WIDTH_IN / width_px), dpi=width_px / WIDTH_IN)
-        self._canvas = FigureCanvasAgg(figure)
+        self._canvas = _canvas(figure)
         follower = scene.follower.replace("_", " ")
         plan, view = _axes(figure, (0.075, 0.425, 0.445, 0.53)), _axes(figure, (0.545, 0.60, 0.435, 0.335))
         steps, place = _axes(figure, (0.075, 0.085, 0.56, 0.24)), _axes(figure, (0.72, 0.085, 0.265, 0.265))
@@ -91,6 +90,13 @@ class AnimationFigure:
                 scene.words(stamp_ns, looks=looks),
             )
         )
+
+
+def _canvas(figure: Figure) -> Any:
+    """Make what the figure is drawn on; matplotlib tells no types of it."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    return FigureCanvasAgg(figure)
 
 
 def _axes(figure: Figure, place: tuple[float, float, float, float]) -> Any:

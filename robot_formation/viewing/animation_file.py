@@ -124,9 +124,7 @@ def write_mp4(path: Path, pictures: Iterable[Picture], size: tuple[int, int], fp
         try:
             _feed(process, pictures)
         finally:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
+            _end(process)
         if process.returncode:
             said.seek(0)
             lines = said.read(4096).decode(errors="replace").split("\n")
@@ -141,9 +139,18 @@ def _feed(process: subprocess.Popen[bytes], pictures: Iterable[Picture]) -> None
     with contextlib.suppress(BrokenPipeError):
         for picture in pictures:
             process.stdin.write(np.ascontiguousarray(picture).tobytes())
-    with contextlib.suppress(BrokenPipeError):
         process.stdin.close()
     process.wait()
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process that is still at work, and close what leads to it."""
+    if process.poll() is None:
+        process.kill()
+        process.wait()
+    if process.stdin is not None:
+        with contextlib.suppress(BrokenPipeError):
+            process.stdin.close()
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _MOST_BLOCKS = 8
 """Blocks that are drawn; a marker has three faces."""
-_LABEL_PX, _GAP_PX = 18.0, 4.0
+_LABEL_PX, _GAP_PX = 15.0, 4.0
 """Height of a label, and its distance from its block, in the camera's pixels."""
 
 
@@ -27,7 +27,8 @@ class CameraPanel:
 
         self._axes, self._camera = axes, camera
         picture = camera.view(stamp_ns).picture
-        axes.set_axis_off()
+        axes.set(xticks=[], yticks=[])
+        axes.spines[["top", "right"]].set_visible(True)
         self._image = axes.imshow(picture, animated=True, interpolation="antialiased")
         halo = [withStroke(linewidth=3.6, foreground="black")]
         self._boxes = [self._box(halo) for _ in range(_MOST_BLOCKS)]
@@ -37,7 +38,7 @@ class CameraPanel:
     def _box(self, halo: list[Any]) -> Rectangle:
         from matplotlib.patches import Rectangle
 
-        style = {"fill": False, "edgecolor": "white", "linewidth": 1.6, "path_effects": halo}
+        style: dict[str, Any] = {"fill": False, "edgecolor": "white", "linewidth": 1.6, "path_effects": halo}
         box = Rectangle((0.0, 0.0), 1.0, 1.0, animated=True, **style)
         self._axes.add_patch(box)
         return box

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,7 +62,7 @@ class PlacePanel:
             self._forecast.set_xy(np.array([scene.off_place_uv_m(corner, stamp_ns) for corner in corners]) * _CM)
 
 
-def _off_place_cm(scene: RecordedScene, stamps_ns: NDArray[np.float64]) -> NDArray[np.float64]:
+def _off_place_cm(scene: RecordedScene, stamps_ns: Iterable[float]) -> NDArray[np.float64]:
     """Return where the follower was about its place at several times, (n, 2), u and v in centimetres."""
     found = [scene.off_place_uv_m(scene.at(scene.follower, int(stamp)), int(stamp)) for stamp in stamps_ns]
     return np.array(found) * _CM
@@ -69,7 +70,6 @@ def _off_place_cm(scene: RecordedScene, stamps_ns: NDArray[np.float64]) -> NDArr
 
 def _reach_cm(scene: RecordedScene) -> float:
     """Return how far the panel reaches: the follower is in it all the time, or nearly so where it gets lost."""
-    stamps_ns = scene.poses(scene.follower).stamps_ns
-    stamps_ns = np.union1d(stamps_ns, scene.poses(scene.neighbour).stamps_ns).astype(float)
-    farthest = np.quantile(np.abs(_off_place_cm(scene, stamps_ns)).max(axis=1), 0.99)
+    own, others = (scene.poses(robot).stamps_ns.tolist() for robot in (scene.follower, scene.neighbour))
+    farthest = np.quantile(np.abs(_off_place_cm(scene, [*own, *others])).max(axis=1), 0.99)
     return max(_LEAST_REACH_CM, math.ceil(1.15 * float(farthest)))

@@ -69,7 +69,7 @@ class PlanPanel:
         body = {"edgecolor": "black", "linewidth": 0.8, "alpha": 0.55}
         self._bodies = {robot: self._polygon(facecolor=robot_colour(robot), **body) for robot in scene.robots}
         self._faces = {robot: [self._face(colour) for colour in _FACE_COLOURS] for robot in scene.robots}
-        self._forecast = self._polygon(facecolor=FORECAST_COLOUR, edgecolor=FORECAST_COLOUR, linewidth=1.2)
+        self._forecast = self._polygon(facecolor=FORECAST_COLOUR, edgecolor=FORECAST_COLOUR, linewidth=1.2, alpha=0.75)
 
     def _way(self, colour: str) -> Line2D:
         (line,) = self._axes.plot([], [], color=colour, linewidth=1.8, animated=True)
@@ -131,7 +131,7 @@ def _draw_ground(axes: Axes, ground: Ground) -> None:
     from matplotlib.tri import Triangulation
 
     x, y, z = ground.vertices_m.T
-    edges = {"fill": False, "edgecolor": "0.25", "linewidth": 1.0}
+    edges: dict[str, Any] = {"fill": False, "edgecolor": "0.25", "linewidth": 1.0}
     axes.add_patch(Rectangle((x.min() * _CM, y.min() * _CM), np.ptp(x) * _CM, np.ptp(y) * _CM, **edges))
     if np.ptp(z) < _FLAT_M:
         return

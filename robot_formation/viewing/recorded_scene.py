@@ -12,7 +12,7 @@ from robot_formation import names
 from robot_formation.analysis.chain import moves_of_timestep, pose_at_end
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.from_bag import run_record
-from robot_formation.analysis.quantities import FollowerAnalysis, analyse
+from robot_formation.analysis.quantities import analyse
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.parameters import suggestion

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _CM = 100.0
 _LEAST_CM = 1.0
 _MOST_TICKS = 25
-_BARS = {"width": 0.72, "edgecolor": "white", "linewidth": 0.5, "animated": True}
+_BARS: dict[str, Any] = {"width": 0.72, "edgecolor": "white", "linewidth": 0.5, "animated": True}
 
 
 class TimestepPanel:
