@@ -180,7 +180,7 @@ def test_the_readme_links_to_every_node_and_names_every_verb() -> None:
         assert f"](docs/reference/nodes/{node}.md)" in readme
     for verb in VERBS:
         name = verb.__name__.rpartition(".")[2].rstrip("_")
-        assert re.search(rf"^\| `{name}\b", readme, re.MULTILINE)
+        assert re.search(rf"^\|[^|]*`{name}\b", readme, re.MULTILINE)
 
 
 def test_the_pages_scenario_can_be_loaded(tmp_path: Path) -> None:
