@@ -21,6 +21,7 @@ from robot_formation.components.node_parameters import (
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.chain_defaults import backdrop, unchecked_headings
+from robot_formation.experiment.formations import ABREAST, FORMATIONS, slots_of
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.experiment.path_check import PathCheck
 from robot_formation.experiment.path_plan import (
@@ -33,9 +34,11 @@ from robot_formation.experiment.path_plan import (
 )
 from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.follower.fine_tuning import AlignmentModeName
+from robot_formation.geometry.slots import Slots, leader_places
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.parameters import (
+    LENGTH_PAIRS,
     PAIRS,
     ParameterError,
     check_as,
@@ -80,6 +83,7 @@ FOLLOWS_FROM_SETUP = {
     },
     "fine_tuner": {
         "done_listeners": "'followers'",
+        "formation_ahead_m": "'formation' or 'slots' of the scenario",
         "blackouts": "'blackouts' of the scenario",
         "schedule": "'schedule' of the scenario",
         "spacing": "'spacing' of the scenario",
@@ -104,6 +108,17 @@ class Setup:
     spacing: Spacing = parameter(
         Spacing.RIGID,
         "What a follower's place is: beside its neighbour, or (delayed) where that was one timestep earlier",
+    )
+    formation: str = parameter(
+        ABREAST, "Where the followers' places are; echelon: each a little behind the one before", known=FORMATIONS
+    )
+    slots: LENGTH_PAIRS = parameter(
+        (),
+        "Places of one's own in place of 'formation', each from the robot on the left: pairs of distance to the right "
+        "and offset ahead (negative: behind), like [[0.32, -0.05]], one for each follower or one for all",
+        unit="m",
+        low=-2.0,
+        high=2.0,
     )
     start_x_m: float = parameter(0.763, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
     start_y_m: float = parameter(0.158, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
@@ -132,6 +147,7 @@ class Scenario:
         setup: what a scenario says beside the nodes' parameters.
         settings: the parameters that it sets, from which it is made anew when something is changed.
         given: which entries of the setup's start were given, and are not to be chosen for the path.
+        slots: the followers' places, each in its neighbour's frame.
     """
 
     setup: Setup
@@ -144,6 +160,7 @@ class Scenario:
     predictor: PredictorParameters
     fine_tuner: FineTunerNodeParameters
     leader: LeaderParameters
+    slots: Slots
 
     @property
     def robots(self) -> list[str]:
@@ -160,7 +177,13 @@ class Scenario:
         found = self.node(kind)
         if isinstance(found, FineTunerNodeParameters):
             # The leader hears every follower, a follower the one on its left.
-            found = replace(found, done_listeners=1 if robot == self.robots[-1] else 2)
+            place = self.slots[self.robots.index(robot) - 1]
+            found = replace(
+                found,
+                done_listeners=1 if robot == self.robots[-1] else 2,
+                formation_distance_m=place.u_m,
+                formation_ahead_m=place.v_m,
+            )
         if kind.name in KNOWN_STEP and (number := self.robots.index(robot)) > 1:
             values = {**to_mapping(found), **self._known_step(kind.name, number)}
             return from_mapping(kind.parameter_class(), values, where=kind.name)
@@ -170,7 +193,7 @@ class Scenario:
         if self.setup.spacing is Spacing.DELAYED:  # its neighbour stands still in timestep 1
             own = self.settings.get(kind, {})
             return {name: 0.0 for name in KNOWN_STEP[kind] if name not in own}
-        return known_step(kind, self.leader, number, self.fine_tuner.formation_distance_m, self.settings.get(kind, {}))
+        return known_step(kind, self.leader, leader_places(self.slots)[number], self.settings.get(kind, {}))
 
     def by_node(self) -> dict[str, dict[str, object]]:
         """List all parameters as plain values: by node, then by dotted name."""
@@ -228,8 +251,7 @@ class Scenario:
             ParameterError: naming the robot, the timestep and what would fit.
         """
         chosen = self.leader.path != STRAIGHT and not any(entry in self.given for entry in START)
-        distance_m = self.fine_tuner.formation_distance_m
-        PathCheck(leader or self.leader, self.world, self.drive, distance_m, self.setup.followers, chosen).require()
+        PathCheck(leader or self.leader, self.world, self.drive, self.slots, chosen).require()
 
 
 def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> Scenario:
@@ -250,9 +272,9 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
 
     leader = made(LeaderParameters, "leader", followers=_robots(setup)[1:], seed=setup.seed, schedule=setup.schedule)
     timed = {"schedule": setup.schedule, "timesteps": leader.timesteps, "period_s": leader.period_s}
-    distance_m = made(FineTunerNodeParameters, "fine_tuner").formation_distance_m
+    slots = _slots(setup, made(FineTunerNodeParameters, "fine_tuner").formation_distance_m, settings)
     ground = made(WorldNodeParameters, "world")
-    x_m, y_m = path_start(leader, setup.followers, setup.heading_deg, distance_m, ground) or (
+    x_m, y_m = path_start(leader, slots, setup.heading_deg, ground) or (
         setup.start_x_m,
         setup.start_y_m,
     )
@@ -262,12 +284,12 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         start_y_m=setup.start_y_m if "start_y_m" in given else y_m,
     )
     boards = backdrop(setup.followers, settings.get("world", {}))
-    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m), **timed, **boards)
+    world = made(WorldNodeParameters, "world", **_starts(setup, slots), **timed, **boards)
     own = settings.get("overhead_tracker", {})
     known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
-    bounds = prediction_bounds(leader, distance_m, ground)
+    bounds = prediction_bounds(leader, slots, ground)
     bounds = {name: value for name, value in bounds.items() if name not in settings.get("fine_tuner", {})}
-    first = {kind: known_step(kind, leader, 1, distance_m, settings.get(kind, {})) for kind in KNOWN_STEP}
+    first = {kind: known_step(kind, leader, slots[0], settings.get(kind, {})) for kind in KNOWN_STEP}
     return Scenario(
         setup,
         settings,
@@ -282,12 +304,15 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
             "fine_tuner",
             blackouts=setup.flat_blackouts,
             spacing=setup.spacing,
+            formation_distance_m=slots[0].u_m,
+            formation_ahead_m=slots[0].v_m,
             **timed,
             **unchecked_headings(setup.schedule, settings.get("fine_tuner", {})),
             **first["fine_tuner"],
             **bounds,
         ),
-        with_room(leader, world, setup.followers, distance_m),
+        with_room(leader, world, slots),
+        slots,
     )
 
 
@@ -298,16 +323,22 @@ def _robots(setup: Setup) -> list[str]:
     return [names.LEADER, *(names.follower(n) for n in range(1, setup.followers + 1))]
 
 
-def _starts(setup: Setup, distance_m: float) -> dict[str, object]:
-    """Return the world's parameters that follow from the setup: each robot stands on the right of the one before."""
+def _slots(setup: Setup, distance_m: float, settings: Settings) -> Slots:
+    if setup.slots and "formation_distance_m" in settings.get("fine_tuner", {}):
+        raise ParameterError("'slots' say the distances, and 'fine_tuner.formation_distance_m' does too; keep one")
+    return slots_of(setup.formation, setup.slots, setup.followers, distance_m)
+
+
+def _starts(setup: Setup, slots: Slots) -> dict[str, object]:
+    """Return the world's parameters that follow from the setup: each robot stands in its place."""
     robots, heading = _robots(setup), math.radians(setup.heading_deg)
-    right = (math.sin(heading), -math.cos(heading))
-    places = [distance_m * n for n in range(len(robots))]
+    cosine, sine = math.cos(heading), math.sin(heading)
+    places = leader_places(slots)
     return {
         "seed": setup.seed,
         "robots": robots,
-        "start_x_m": [setup.start_x_m + d * right[0] for d in places],
-        "start_y_m": [setup.start_y_m + d * right[1] for d in places],
+        "start_x_m": [setup.start_x_m + (place.x_m * cosine - place.y_m * sine) for place in places],
+        "start_y_m": [setup.start_y_m + (place.x_m * sine + place.y_m * cosine) for place in places],
         "start_heading_rad": [heading] * len(robots),
     }
 
