@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Mapping
 
+from robot_formation.geometry.slots import Slots
 from robot_formation.json_values import JsonObject
 
 _FARTHEST_M = 100.0
@@ -35,6 +36,11 @@ def mapping(details: Mapping[str, str], key: str) -> JsonObject:
 def node_parameters(details: Mapping[str, str]) -> dict[str, JsonObject]:
     """Read the parameters of the run's nodes, flat, by kind of node; empty where it says none or nonsense."""
     return {kind: found for kind, found in mapping(details, "parameters").items() if isinstance(found, dict)}
+
+
+def slots_text(slots: Slots) -> str:
+    """Return the followers' places as the run says them: see `said_slots`."""
+    return json.dumps([place.uv_m for place in slots])
 
 
 def said_slots(details: Mapping[str, str]) -> list[tuple[float, float]]:

@@ -102,9 +102,22 @@ class PathCheck:
                 larger = f" or a plate of {size_m:.2f} m (world.surface_parameters=[size_m={size_m:.2f}])"
                 raise ParameterError(
                     f"{robot} would stand with a part of its body beyond the plate of {self._plate_m:g} x "
-                    f"{self._plate_m:g} m; take fewer followers, another start_x_m and start_y_m"
+                    f"{self._plate_m:g} m; take fewer followers, another {self._start_on_plate(start, whole)}"
                     f"{larger if size_m > self._plate_m and box.min() >= 0.0 else ''}"
                 )
+
+    def _start_on_plate(self, start: Motion, whole: Formation) -> str:
+        """Say from where all of a formation stands on the plate, whole centimetres, as far as it does."""
+        low_x, high_x, low_y, high_y = map(float, whole.boxes(np.array([(start.x_m, start.y_m, start.yaw_rad)]))[0])
+        if max(high_x - low_x, high_y - low_y) > self._plate_m:
+            return "start_x_m and start_y_m"
+        chosen = []
+        for name, now, low, high in (("start_x_m", start.x_m, low_x, high_x), ("start_y_m", start.y_m, low_y, high_y)):
+            if low < 0.0:
+                chosen.append(f"{name}={_up(now - low):g}")
+            elif high > self._plate_m:
+                chosen.append(f"{name}={-_up(high - self._plate_m - now):g}")
+        return f"start ({', '.join(chosen)} would do)"
 
     def problem(self, path: LeaderPath) -> Problem | None:
         """Find the first reason why a path can't be followed; None if it can."""
