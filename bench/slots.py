@@ -55,10 +55,10 @@ def run(slots: list[list[float]], mode: str, seed: int, settings: list[str]) -> 
     ]
     found = analyse(run_in_memory(scenarios.override(scenarios.load_track("one"), chosen)))
     totals = [follower.totals for follower in found.followers]
-    return Found(
-        *(max(math.inf if entry[name] is None else entry[name] for entry in totals) for name in TOTALS),
-        outcome=found.outcome,
+    rmse_m, most_m, movements = (
+        max(math.inf if entry[name] is None else float(entry[name]) for entry in totals) for name in TOTALS
     )
+    return Found(rmse_m, most_m, movements, found.outcome)
 
 
 def main() -> None:

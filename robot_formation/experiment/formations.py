@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from robot_formation import names
-from robot_formation.geometry.slots import Slots, slot
+from robot_formation.geometry.slots import Slots, leader_places, slot
 from robot_formation.parameters import ParameterError, suggestion
 
 ABREAST, ECHELON = "abreast", "echelon"
@@ -44,6 +45,18 @@ def slots_of(formation: str, pairs: Sequence[tuple[float, float]], followers: in
                 "camera, which looks left, sees the Target face, which looks right; give a distance above 0"
             )
     return tuple(slot(*pair) for pair in pairs) * (1 if len(pairs) == followers else followers)
+
+
+def starts_of(x_m: float, y_m: float, heading_deg: float, slots: Slots) -> dict[str, object]:
+    """Return the world's parameters that say where robots stand in formation, from the leader's start and heading."""
+    heading = math.radians(heading_deg)
+    cosine, sine = math.cos(heading), math.sin(heading)
+    places = leader_places(slots)
+    return {
+        "start_x_m": [x_m + (place.x_m * cosine - place.y_m * sine) for place in places],
+        "start_y_m": [y_m + (place.x_m * sine + place.y_m * cosine) for place in places],
+        "start_heading_rad": [heading] * len(places),
+    }
 
 
 def _check_name(formation: str) -> None:

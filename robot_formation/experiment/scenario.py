@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from robot_formation.components.node_parameters import (
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.chain_defaults import backdrop, unchecked_headings
-from robot_formation.experiment.formations import ABREAST, FORMATIONS, slots_of
+from robot_formation.experiment.formations import ABREAST, FORMATIONS, slots_of, starts_of
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.experiment.path_check import PathCheck
 from robot_formation.experiment.path_plan import (
@@ -147,7 +146,6 @@ class Scenario:
         setup: what a scenario says beside the nodes' parameters.
         settings: the parameters that it sets, from which it is made anew when something is changed.
         given: which entries of the setup's start were given, and are not to be chosen for the path.
-        slots: the followers' places, each in its neighbour's frame.
     """
 
     setup: Setup
@@ -160,12 +158,16 @@ class Scenario:
     predictor: PredictorParameters
     fine_tuner: FineTunerNodeParameters
     leader: LeaderParameters
-    slots: Slots
 
     @property
     def robots(self) -> list[str]:
         """Names of the robots, the leader first."""
         return _robots(self.setup)
+
+    @property
+    def slots(self) -> Slots:
+        """The followers' places, each in its neighbour's frame."""
+        return _slots(self.setup, self.fine_tuner.formation_distance_m)
 
     def node(self, kind: NodeKind[P]) -> P:
         """Return the parameters of a kind of node."""
@@ -272,7 +274,9 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
 
     leader = made(LeaderParameters, "leader", followers=_robots(setup)[1:], seed=setup.seed, schedule=setup.schedule)
     timed = {"schedule": setup.schedule, "timesteps": leader.timesteps, "period_s": leader.period_s}
-    slots = _slots(setup, made(FineTunerNodeParameters, "fine_tuner").formation_distance_m, settings)
+    if setup.slots and "formation_distance_m" in settings.get("fine_tuner", {}):
+        raise ParameterError("'slots' say the distances, and 'fine_tuner.formation_distance_m' does too; keep one")
+    slots = _slots(setup, made(FineTunerNodeParameters, "fine_tuner").formation_distance_m)
     ground = made(WorldNodeParameters, "world")
     x_m, y_m = path_start(leader, slots, setup.heading_deg, ground) or (
         setup.start_x_m,
@@ -284,7 +288,9 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         start_y_m=setup.start_y_m if "start_y_m" in given else y_m,
     )
     boards = backdrop(setup.followers, settings.get("world", {}))
-    world = made(WorldNodeParameters, "world", **_starts(setup, slots), **timed, **boards)
+    starts = starts_of(setup.start_x_m, setup.start_y_m, setup.heading_deg, slots)
+    identity = {"seed": setup.seed, "robots": _robots(setup)}
+    world = made(WorldNodeParameters, "world", **identity, **starts, **timed, **boards)
     own = settings.get("overhead_tracker", {})
     known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in own}
     bounds = prediction_bounds(leader, slots, ground)
@@ -312,7 +318,6 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
             **bounds,
         ),
         with_room(leader, world, slots),
-        slots,
     )
 
 
@@ -323,24 +328,8 @@ def _robots(setup: Setup) -> list[str]:
     return [names.LEADER, *(names.follower(n) for n in range(1, setup.followers + 1))]
 
 
-def _slots(setup: Setup, distance_m: float, settings: Settings) -> Slots:
-    if setup.slots and "formation_distance_m" in settings.get("fine_tuner", {}):
-        raise ParameterError("'slots' say the distances, and 'fine_tuner.formation_distance_m' does too; keep one")
+def _slots(setup: Setup, distance_m: float) -> Slots:
     return slots_of(setup.formation, setup.slots, setup.followers, distance_m)
-
-
-def _starts(setup: Setup, slots: Slots) -> dict[str, object]:
-    """Return the world's parameters that follow from the setup: each robot stands in its place."""
-    robots, heading = _robots(setup), math.radians(setup.heading_deg)
-    cosine, sine = math.cos(heading), math.sin(heading)
-    places = leader_places(slots)
-    return {
-        "seed": setup.seed,
-        "robots": robots,
-        "start_x_m": [setup.start_x_m + (place.x_m * cosine - place.y_m * sine) for place in places],
-        "start_y_m": [setup.start_y_m + (place.x_m * sine + place.y_m * cosine) for place in places],
-        "start_heading_rad": [heading] * len(robots),
-    }
 
 
 def presets() -> dict[str, Path]:
