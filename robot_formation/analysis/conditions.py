@@ -32,7 +32,7 @@ def conditions(
             for name, usual in (("schedule", "turns"), ("spacing", "rigid"))
             if (found := _word(fine_tuner.get(name))) not in (None, usual)
         },
-        **({"slots": [list(pair) for pair in slots]} if any(ahead_m for _, ahead_m in slots) else {}),
+        **({} if _abreast(slots) else {"slots": [list(pair) for pair in slots]}),
     }
 
 
@@ -56,6 +56,11 @@ def conditions_text(found: Mapping[str, object]) -> str:
     if found.get("slots"):
         said.append(f"slots {found['slots']} m")
     return ", ".join(said)
+
+
+def _abreast(slots: Sequence[tuple[float, float]]) -> bool:
+    """Whether all places are beside their neighbours at the same distance, which the nodes' parameters say."""
+    return len(set(slots)) < 2 and not any(ahead_m for _, ahead_m in slots)
 
 
 def _word(found: object) -> str | None:

@@ -219,6 +219,8 @@ class Scenario:
                 f"'blackouts' last until timestep {last}, but the run has only {self.leader.timesteps} timesteps; "
                 "shorten them or raise 'leader.timesteps'"
             )
+        for robot in self.robots[1:]:
+            self.of_robot(KINDS["fine_tuner"], robot)  # refuses a place that its mode can't keep
         fastest = self.world.motor.max_speed_rad_s
         if self.drive.wheel_speed_rad_s > fastest:
             raise ParameterError(

@@ -96,6 +96,9 @@ def test_a_turning_leaders_followers_begin_with_the_steps_of_their_own_places() 
         (["slots=[0.32, 0.0]"], r"a list of pairs like \[\[0.32, -0.05\]\]"),
         (["slots=[[0.32, behind]]"], "must be of type float, not 'behind'"),
         (["slots=[[0.24, -0.05]]"], "leaves less than"),
+        (["slots=[[0.32, 0.0], [0.25, 0.0]]"], "leaves less than"),
+        (["slots=[[0.32, 0.0], [0.32, 0.05]]", "fine_tuner.mode=paper"], "it needs to see the Target face alone"),
+        (["slots=[[0.32, 0.0], [0.32, 0.6]]"], "outside -0.5 to 0.5 m"),
         (["slots=[[0.245, 0.0]]", "fine_tuner.mode=paper"], "within a centimetre of each other"),
         (["slots=[[0.32, -0.12]]"], r"whole Target face in view; from 0.105 m behind to 0.155 m ahead it would"),
         (["slots=[[0.32, 0.17]]"], r"whole Target face in view; from 0.105 m behind to 0.155 m ahead it would"),
@@ -129,6 +132,7 @@ def test_slots_are_conditions_of_a_run_unless_abreast() -> None:
     echelon = run_facts(run_metadata(scenario("formation=echelon")))["conditions"]
     assert echelon["slots"] == [[0.32, -0.05], [0.32, -0.05]]
     assert "slots [[0.32, -0.05], [0.32, -0.05]] m" in conditions_text(echelon)
+    assert run_facts(run_metadata(scenario("slots=[[0.3, 0.0], [0.35, 0.0]]")))["conditions"]["slots"][1] == [0.35, 0.0]
     assert "slots" not in run_facts(run_metadata(scenario()))["conditions"]
 
 
