@@ -19,7 +19,8 @@ from robot_formation.components.predictor import PredictorComponent
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.follower.alignment_state import AlignmentState
-from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.slots import slot
 from robot_formation.names import Message
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
@@ -27,6 +28,7 @@ from robot_formation.world.pose import Pose, pose_on_surface
 
 IDEAL = ("ideal", "ideal+close")
 _ITERATIONS = 8
+_BESIDE = slot(FORMATION_DISTANCE_M)
 
 
 class IdealRun(InProcessRun):
@@ -98,7 +100,7 @@ class TargetFace:
         self._corners = np.array([(x, -half, z) for x in (-half, half) for z in (top - 2.0 * half, top)])
 
     def offset(
-        self, robot: Pose, neighbour: Pose, alignment: AlignmentParameters, place: Motion
+        self, robot: Pose, neighbour: Pose, alignment: AlignmentParameters, place: Motion = _BESIDE
     ) -> tuple[float, float]:
         """Way to the place, given in the neighbour's frame, as the fine-tuner reckons it: (x, y) in metres."""
         alignment = alignment.at_place(place)
