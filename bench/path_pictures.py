@@ -11,7 +11,8 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.slots import leader_places, slot
 from robot_formation.leader.paths import Given, make_path, poses
 from robot_formation.leader.rigid_formation import Formation, room_around
 
@@ -39,7 +40,7 @@ def draw(folder: Path) -> None:
     figure = Figure(figsize=(11.0, 9.6), layout="constrained")
     FigureCanvasAgg(figure)
     for axes, (name, texts, timesteps) in zip(figure.subplots(3, 4).flat, PANELS, strict=True):
-        room = room_around(Formation(1, 0.32, 0.365, 0.238), START, PLATE_M)
+        room = room_around(Formation(leader_places([slot(FORMATION_DISTANCE_M)]), 0.365, 0.238), START, PLATE_M)
         track = poses(make_path(name, texts, Given(seed=4, room=room)), timesteps)
         ahead, left = [pose.x_m for pose in track], [pose.y_m for pose in track]
         axes.plot(left, ahead, "-o", color=TRACK_COLOUR, markersize=3.0, linewidth=1.0)

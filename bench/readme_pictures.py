@@ -41,6 +41,7 @@ from robot_formation.world.sensor import Sensor
 
 PICTURES = Path(__file__).parent.parent / "docs" / "pictures"
 SEED = 3
+SLOTS_AHEAD_M = (-0.1, 0.15)
 HEIGHTS_MM = (60, 80, 100, 120, 140, 160, 180)
 WORLD = WorldParameters()
 LEADER_COLOUR, FOLLOWER_COLOUR = "#E69F00", "#0072B2"
@@ -176,13 +177,16 @@ def _dimension(axes: Axes, left: float, right: float, y: float, text: str) -> No
     axes.text((left + right) / 2, y - 0.008, text, ha="center", va="top", fontsize=9, zorder=8)
 
 
-def draw_view(folder: Path) -> None:
-    """Draw what a follower's camera sees in formation and 12 cm ahead of it, with its blocks."""
+def _detector() -> BlockDetector:
     parameters = from_mapping(
         DetectorParameters, {"signature_range": [5.0, 6.0, 6.0], "max_merge_dist": 4}, where="bench"
     )
-    detector = BlockDetector(load_signatures(config_dir() / "signatures.yaml"), parameters)
-    _draw_blocks(folder / "camera.jpg", detector, [_view(WORLD), _view(WORLD, ahead_m=0.12)])
+    return BlockDetector(load_signatures(config_dir() / "signatures.yaml"), parameters)
+
+
+def draw_view(folder: Path) -> None:
+    """Draw what a follower's camera sees in formation and 12 cm ahead of it, with its blocks."""
+    _draw_blocks(folder / "camera.jpg", _detector(), [_view(WORLD), _view(WORLD, ahead_m=0.12)])
 
 
 def draw_boards(folder: Path) -> None:
@@ -190,6 +194,11 @@ def draw_boards(folder: Path) -> None:
     detector = BlockDetector(load_signatures(config_dir() / "signatures.yaml"), DetectorParameters())
     boards = [from_mapping(WorldParameters, {"marker": {"backdrop_m": width}}, where="bench") for width in (0.0, 0.16)]
     _draw_blocks(folder / "boards.jpg", detector, [_view(world, farther_ahead_m=0.05) for world in boards])
+
+
+def draw_slots(folder: Path) -> None:
+    """Draw what a follower sees of its neighbour from a slot behind and from one ahead."""
+    _draw_blocks(folder / "slots.jpg", _detector(), [_view(WORLD, ahead_m=offset_m) for offset_m in SLOTS_AHEAD_M])
 
 
 def draw_tags(folder: Path) -> None:
@@ -245,7 +254,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=PICTURES, help="folder (default: docs/pictures)")
     folder = parser.parse_args().out
     folder.mkdir(parents=True, exist_ok=True)
-    for draw in (draw_run, draw_frames, draw_view, draw_boards, draw_tags):
+    for draw in (draw_run, draw_frames, draw_view, draw_boards, draw_slots, draw_tags):
         draw(folder)
     return 0
 

@@ -75,6 +75,11 @@ def follower(number: int) -> str:
     return f"follower_{number}"
 
 
+def follower_number(robot: str) -> int:
+    """Return a follower's number, from 1."""
+    return int(robot.rpartition("_")[2])
+
+
 def beacon_neighbour(robot: str) -> str:
     """Return the name of the robot on a follower's left, which it keeps its place beside.
 

@@ -29,7 +29,9 @@ LIST_ELEMENTS: dict[object, type] = {
 """Types of parameters that are lists, and of what."""
 
 PAIRS = tuple[tuple[int, int], ...]
-"""Type of parameters that are lists of pairs of whole numbers; only scenarios have such, ROS has none."""
+LENGTH_PAIRS = tuple[tuple[float, float], ...]
+PAIR_ELEMENTS: dict[object, type] = {PAIRS: int, LENGTH_PAIRS: float}
+"""Types of parameters that are lists of pairs, and of what; only scenarios have such, ROS has none."""
 
 _LONGEST_NAME = 100
 _LISTED = 240  # characters
@@ -289,8 +291,8 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     Raises:
         ParameterError: on a wrong type, or a value outside the range or the choices.
     """
-    if spec.type == PAIRS:
-        return _check_pairs(spec, value, subject)
+    if spec.type in PAIR_ELEMENTS:
+        return _check_pairs(spec, PAIR_ELEMENTS[spec.type], value, subject)
     if spec.type in LIST_ELEMENTS:
         if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
             raise ParameterError(f"{subject} must be a list, not {shown(value)}")
@@ -305,14 +307,15 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     return spec.choice(checked) if spec.choice else checked
 
 
-def _check_pairs(spec: Spec, value: object, subject: str) -> object:
-    wrong = ParameterError(f"{subject} must be a list of pairs like [[12, 3]], not {shown(value)}")
+def _check_pairs(spec: Spec, kind: type, value: object, subject: str) -> object:
+    example = "[[12, 3]]" if kind is int else "[[0.32, -0.05]]"
+    wrong = ParameterError(f"{subject} must be a list of pairs like {example}, not {shown(value)}")
     if not isinstance(value, (list, tuple)):
         raise wrong
     for pair in value:
         if not isinstance(pair, (list, tuple)) or len(pair) != 2:
             raise wrong
-    return tuple(tuple(_check_one(spec, int, item, subject) for item in pair) for pair in value)
+    return tuple(tuple(_check_one(spec, kind, item, subject) for item in pair) for pair in value)
 
 
 def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:

@@ -24,7 +24,7 @@ from robot_formation.vision.pixy2.block import Block
 class AlignmentParameters:
     """Camera calibration, tolerances and steps of the paper's fine-tuning.
 
-    Cameras are calibrated at the default formation distance, `geometry.se2.FORMATION_DISTANCE_M`.
+    Cameras are calibrated beside the neighbour at the default formation distance, `geometry.se2.FORMATION_DISTANCE_M`.
     """
 
     target_x_px: float = parameter(158.5, "Column of the Target block in formation", unit="px", low=0.0, high=315.0)
@@ -67,20 +67,38 @@ class AlignmentParameters:
     )
     max_empty_looks: int = parameter(3, "Looks without a block after which the leader is lost", low=1, high=1000)
 
-    def at_distance(self, formation_distance_m: float) -> AlignmentParameters:
-        """Return the parameters for another formation distance [m], by pinhole projection from the calibrated one.
+    def at_place(self, place: Motion) -> AlignmentParameters:
+        """Return the parameters for another place in the neighbour's frame, by pinhole projection from the calibrated.
 
         Raises:
             ParameterError: if the lens would be on the neighbour's Target face, or behind it.
         """
-        distance_m = self.distance_m + (formation_distance_m - FORMATION_DISTANCE_M)
+        distance_m = self.distance_m + (place.u_m - FORMATION_DISTANCE_M)
         if distance_m <= 0.0:
             raise ParameterError(
-                f"fine_tuner: 'formation_distance_m' of {formation_distance_m} leaves no distance between lens and "
+                f"fine_tuner: 'formation_distance_m' of {place.u_m} leaves no distance between lens and "
                 f"Target face; it must be more than {FORMATION_DISTANCE_M - self.distance_m:.3f}"
             )
         slope_px_per_m = self.slope_px_per_m * (self.distance_m / distance_m)
-        return replace(self, distance_m=distance_m, slope_px_per_m=slope_px_per_m)
+        target_x_px = self.target_x_px - slope_px_per_m * place.v_m
+        return replace(self, distance_m=distance_m, slope_px_per_m=slope_px_per_m, target_x_px=target_x_px)
+
+    def check_place(self, place: Motion) -> None:
+        """Check that the paper's rules can keep a place in the neighbour's frame.
+
+        Raises:
+            ParameterError: as for `at_place`, or if other faces would show than the Target face: the rules drive away
+                from where they do.
+        """
+        self.at_place(place)
+        most_m = 0.5 * self.side_px_m / (self.slope_px_per_m * self.distance_m)  # half of the marker's edge
+        if abs(place.v_m) > most_m:
+            where = "ahead of" if place.v_m > 0.0 else "behind"
+            raise ParameterError(
+                f"fine_tuner: 'mode' paper can't keep a place {abs(place.v_m):g} m {where} the neighbour: it needs to "
+                f"see the Target face alone, as up to {math.floor(1e3 * most_m) / 1e3:g} m; take mode precise or a "
+                "smaller offset"
+            )
 
 
 class PaperAlignment:

@@ -1,7 +1,8 @@
 """Where robots of a chain stand: poses at the end of timesteps, errors against the leader, and lag.
 
-The leader's place of follower n is n times the formation distance to the leader's right; with delayed spacing where
-that was n timesteps ago, since each robot keeps its place beside where its neighbour stood one timestep earlier.
+The leader's place of follower n is the sum of the slots up to its own, abreast n times the formation distance to the
+leader's right; with delayed spacing where that was n timesteps ago, since each robot keeps its place beside where its
+neighbour stood one timestep earlier.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.json_values import JsonObject
-from robot_formation.names import LEADER, beacon_neighbour
+from robot_formation.names import LEADER, beacon_neighbour, follower_number
 
 _SAME = 1e-6
 """Sums of moves that differ by less than this are equal, metres and radians."""
@@ -83,8 +84,8 @@ def chain_totals(record: RunRecord, follower: FollowerRecord, errors_m: Sequence
         `formation_error_max_m`; `leader_error_rmse_m`, against its place beside the leader; `lag_m`, the mean way by
         which the place is behind the one of rigid spacing, 0 if the spacing is rigid. None where unavailable.
     """
-    number = int(follower.name.rpartition("_")[2])
-    place_m = number * record.formation_distance_m
+    number = follower_number(follower.name)
+    place = record.leader_place(follower.name)
     errors, lags = [], []
     for t, displacement in enumerate(follower.displacements, 1):
         own = pose(record, follower.name, displacement.stamp_ns)
@@ -97,7 +98,7 @@ def chain_totals(record: RunRecord, follower: FollowerRecord, errors_m: Sequence
         else:
             leader = pose(record, LEADER, displacement.stamp_ns)
         if own is not None and leader is not None:
-            errors.append(math.hypot(*formation_error_uv_m(own, leader, place_m)))
+            errors.append(math.hypot(*formation_error_uv_m(own, leader, place)))
     return {
         "formation_error_max_m": max((error for error in errors_m if error is not None), default=None),
         "leader_error_rmse_m": float(np.sqrt(np.mean(np.square(errors)))) if errors else None,

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from robot_formation.bag.run_details import node_parameters, whole_number
+from robot_formation.bag.run_details import node_parameters, said_slots, whole_number
 from robot_formation.json_values import JsonObject
 
 _SEED_DIGITS = 19  # of 2^63 - 1
 
 
-def conditions(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, object]:
+def conditions(
+    parameters: Mapping[str, Mapping[str, object]], slots: Sequence[tuple[float, float]] = ()
+) -> dict[str, object]:
     """List the conditions of a run by name; None where unknown, or where no run has such a value.
 
     Args:
         parameters: those of the run's nodes, flat, by kind of node; kinds may be missing.
+        slots: how far each follower's place is to the right of its neighbour and ahead of it, metres; empty: unknown.
     """
     world, fine_tuner = parameters.get("world", {}), parameters.get("fine_tuner", {})
     robots = world.get("robots")
@@ -29,6 +32,7 @@ def conditions(parameters: Mapping[str, Mapping[str, object]]) -> dict[str, obje
             for name, usual in (("schedule", "turns"), ("spacing", "rigid"))
             if (found := _word(fine_tuner.get(name))) not in (None, usual)
         },
+        **({} if _abreast(slots) else {"slots": [list(pair) for pair in slots]}),
     }
 
 
@@ -49,7 +53,14 @@ def conditions_text(found: Mapping[str, object]) -> str:
         said.append(f"schedule {found['schedule']}")
     if found.get("spacing") not in (None, "rigid"):
         said.append(f"spacing {found['spacing']}")
+    if found.get("slots"):
+        said.append(f"slots {found['slots']} m")
     return ", ".join(said)
+
+
+def _abreast(slots: Sequence[tuple[float, float]]) -> bool:
+    """Whether all places are beside their neighbours at the same distance, which the nodes' parameters say."""
+    return len(set(slots)) < 2 and not any(ahead_m for _, ahead_m in slots)
 
 
 def _word(found: object) -> str | None:
@@ -64,10 +75,11 @@ def run_facts(details: Mapping[str, str], *, in_process: bool | None = None) -> 
         details: what the run says of itself, as `launching.processes.run_metadata` puts it.
         in_process: whether it ran in one process, which it doesn't say.
     """
+    found = conditions(node_parameters(details), said_slots(details))
     return {
         "seed": whole_number(details, "seed", _SEED_DIGITS),
         "predictor": details.get("predictor"),
         "path": _word(node_parameters(details).get("leader", {}).get("path", "straight" if details else None)),
         "surface": details.get("surface"),
-        "conditions": {**conditions(node_parameters(details)), "in_process": in_process},
+        "conditions": {**found, "in_process": in_process},
     }

@@ -6,8 +6,9 @@ correction distance
     sum of |component| over the moves after the prediction move, realised by the encoder wheels; of a run: over the
     finished timesteps from 4 on (after the collection phase).
 formation error
-    |e| with e = p_F - p_B - R(psi_B)(0, -d): actual minus desired place of base_link in world x, y when the follower
-    reports (ground truth), d to the right of the beacon neighbour B (0.32 m by default). Over the timesteps: RMSE of
+    |e| with e = p_F - p_B - R(psi_B)(a, -d): actual minus desired place of base_link in world x, y when the follower
+    reports (ground truth), d to the right of the beacon neighbour B (0.32 m by default) and a ahead of it (0 by
+    default; the run's slots). Over the timesteps: RMSE of
     |e|; bias, the mean of e in B's frame as u and v; scatter, the RMS distance from it. RMSE^2 = bias^2 + scatter^2.
 prediction coverage
     share of the timesteps from 4 on whose ideal move, the displacement followed by the residual, lies inside the 90 %
@@ -295,7 +296,7 @@ def _ground_truth(
     if pose_f is None or pose_b is None:
         return None, None
     heading_error = math.remainder(pose_f.yaw_rad - pose_b.yaw_rad, math.tau)
-    return formation_error_uv_m(pose_f, pose_b, record.formation_distance_m), heading_error
+    return formation_error_uv_m(pose_f, pose_b, record.place(follower.name)), heading_error
 
 
 def _error_statistics(errors_uv_m: NDArray[np.float64]) -> dict[str, float | None]:

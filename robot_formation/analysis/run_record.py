@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.bag.run_details import node_parameters, whole_number
+from robot_formation import names
+from robot_formation.bag.run_details import node_parameters, said_slots, whole_number
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.slots import leader_places, slot
 from robot_formation.schedule.schedules import Spacing
 
 DOT_HEIGHT_M = 0.216
@@ -161,12 +163,23 @@ class RunRecord:
 
     @property
     def formation_distance_m(self) -> float:
-        """Distance between neighbours in formation, metres: the run's fine-tuner's, else the paper's."""
+        """Distance between neighbours abreast, metres: the run's fine-tuner's, else the paper's."""
         try:
             said = float(node_parameters(self.details)["fine_tuner"]["formation_distance_m"])
         except (KeyError, ValueError, TypeError, OverflowError):
             return FORMATION_DISTANCE_M
         return said if math.isfinite(said) else FORMATION_DISTANCE_M
+
+    def place(self, follower: str) -> Motion:
+        """Return a follower's place in its neighbour's frame: what the run says, else beside it."""
+        number = names.follower_number(follower)
+        slots = said_slots(self.details)
+        return slot(*slots[number - 1]) if number <= len(slots) else slot(self.formation_distance_m)
+
+    def leader_place(self, follower: str) -> Motion:
+        """Return a follower's place in the leader's frame, the sum of its own and those of the robots between."""
+        numbers = range(1, names.follower_number(follower) + 1)
+        return leader_places([self.place(names.follower(number)) for number in numbers])[-1]
 
     @property
     def delayed(self) -> bool:

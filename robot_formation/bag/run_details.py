@@ -6,7 +6,10 @@ import json
 import math
 from collections.abc import Mapping
 
+from robot_formation.geometry.slots import Slots
 from robot_formation.json_values import JsonObject
+
+_FARTHEST_M = 100.0
 
 
 def value(text: str) -> object:
@@ -33,6 +36,21 @@ def mapping(details: Mapping[str, str], key: str) -> JsonObject:
 def node_parameters(details: Mapping[str, str]) -> dict[str, JsonObject]:
     """Read the parameters of the run's nodes, flat, by kind of node; empty where it says none or nonsense."""
     return {kind: found for kind, found in mapping(details, "parameters").items() if isinstance(found, dict)}
+
+
+def slots_text(slots: Slots) -> str:
+    """Return the followers' places as the run says them: see `said_slots`."""
+    return json.dumps([place.uv_m for place in slots])
+
+
+def said_slots(details: Mapping[str, str]) -> list[tuple[float, float]]:
+    """Read where each follower's place is, metres to its neighbour's right and ahead; empty where it is not said."""
+    found = value(details.get("slots", ""))
+    if not isinstance(found, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in found):
+        return []
+    if any(type(part) not in (int, float) or abs(part) > _FARTHEST_M for pair in found for part in pair):
+        return []
+    return [(float(lateral_m), float(ahead_m)) for lateral_m, ahead_m in found]
 
 
 def whole_number(details: Mapping[str, str], key: str, digits: int) -> int | None:

@@ -120,7 +120,7 @@ class AlignmentTrial:
         self._drive = Drive(equipment.drive)
         self._detector = BlockDetector(equipment.detector.load(), equipment.detector)
         self._tuner = FineTuner(equipment.fine_tuner)
-        self._distance_m = equipment.fine_tuner.formation_distance_m
+        self._place = equipment.fine_tuner.place
         self._tamper = tamper
         self._spoil = spoil
         self._frames = 0
@@ -207,7 +207,7 @@ class AlignmentTrial:
         leader = self._world.ground_truth(names.LEADER).pose
         follower = self._world.ground_truth(FOLLOWER).pose
         yaw = math.remainder(follower.yaw_rad - leader.yaw_rad, math.tau)
-        self.trial.errors = (*formation_error_uv_m(follower.planar, leader.planar, self._distance_m), yaw)
+        self.trial.errors = (*formation_error_uv_m(follower.planar, leader.planar, self._place), yaw)
 
 
 def gap_m(a: Pose, b: Pose, length_m: float, width_m: float) -> float:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from robot_formation import conversions, exit_codes, names
 from robot_formation.analysis.from_bag import record_of, run_topics
 from robot_formation.analysis.run_record import RunRecord
+from robot_formation.bag.run_details import slots_text
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import Message
@@ -48,6 +49,7 @@ def run_in_memory(
     details = {
         "scenario": scenario.setup.name,
         "timesteps": str(scenario.leader.timesteps),
+        "slots": slots_text(scenario.slots),
         # What the analysis reads of them: spacing, distances, the marker's height.
         "parameters": json.dumps({"fine_tuner": to_mapping(scenario.fine_tuner), "world": to_mapping(scenario.world)}),
         "outcome": OUTCOMES.get(code, "incomplete"),

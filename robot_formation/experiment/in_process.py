@@ -136,11 +136,10 @@ def run_in_process(
     """
     began = time.monotonic()
     progress = Progress(
-        scenario.setup.followers,
+        scenario.slots,
         scenario.leader.timesteps,
         say,
         lambda: time.monotonic() - began,
-        scenario.fine_tuner.formation_distance_m,
         delayed=scenario.setup.spacing is Spacing.DELAYED,
     )
     run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then

@@ -19,7 +19,8 @@ from robot_formation.components.predictor import PredictorComponent
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.follower.alignment_state import AlignmentState
-from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.slots import slot
 from robot_formation.names import Message
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
@@ -27,6 +28,7 @@ from robot_formation.world.pose import Pose, pose_on_surface
 
 IDEAL = ("ideal", "ideal+close")
 _ITERATIONS = 8
+_BESIDE = slot(FORMATION_DISTANCE_M)
 
 
 class IdealRun(InProcessRun):
@@ -41,8 +43,8 @@ class IdealRun(InProcessRun):
         world = scenario.world
         self._surface = world.make_surface()
         self._face = TargetFace(Camera(self._surface, world), world)
-        tuner = scenario.fine_tuner
-        self._alignment = tuner.alignment.at_distance(tuner.formation_distance_m)
+        self._alignment = scenario.fine_tuner.alignment
+        self._places = dict(zip(scenario.robots[1:], scenario.slots, strict=True))
         super().__init__(scenario, listen=listen)
         self._predictors: dict[str, PredictorComponent] = {}
         for hosted in self._hosted:
@@ -68,7 +70,8 @@ class IdealRun(InProcessRun):
     def _learn(self, namespace: str, residual: Motion) -> None:
         """Compare the camera's residual with the truth: the difference is mostly the same in each timestep."""
         robot = namespace.removeprefix("/")
-        dx_m, dy_m = self._face.offset(self._poses[robot], self._poses[names.beacon_neighbour(robot)], self._alignment)
+        neighbour = self._poses[names.beacon_neighbour(robot)]
+        dx_m, dy_m = self._face.offset(self._poses[robot], neighbour, self._alignment, self._places[robot])
         self._camera_errors[namespace].append((residual.x_m - dx_m, residual.y_m - dy_m))
 
     def _ideal(self, namespace: str) -> Motion:
@@ -80,7 +83,7 @@ class IdealRun(InProcessRun):
         for _ in range(_ITERATIONS):
             along, across, _ = start.place((x_m, y_m, 0.0))
             there = pose_on_surface(self._surface, along, across, start.yaw_rad)
-            dx_m, dy_m = self._face.offset(there, neighbour, self._alignment)
+            dx_m, dy_m = self._face.offset(there, neighbour, self._alignment, self._places[robot])
             x_m, y_m = x_m + dx_m + error_x_m, y_m + dy_m + error_y_m
         predictor = self._predictors.get(namespace)
         bias_u, bias_v = predictor.actuation_bias() if predictor is not None else (0.0, 0.0)
@@ -96,15 +99,18 @@ class TargetFace:
         self._centre_px = world.camera.centre_x_px
         self._corners = np.array([(x, -half, z) for x in (-half, half) for z in (top - 2.0 * half, top)])
 
-    def offset(self, robot: Pose, neighbour: Pose, alignment: AlignmentParameters) -> tuple[float, float]:
-        """Way to the formation position as the fine-tuner reckons it, (x, y) in metres."""
+    def offset(
+        self, robot: Pose, neighbour: Pose, alignment: AlignmentParameters, place: Motion = _BESIDE
+    ) -> tuple[float, float]:
+        """Way to the place, given in the neighbour's frame, as the fine-tuner reckons it: (x, y) in metres."""
+        alignment = alignment.at_place(place)
         corners = self._corners @ neighbour.matrix().T + np.asarray(neighbour.position)
         pixels = self._camera.project(robot, corners)
         width, height = np.ptp(pixels, axis=0)
         column = float(pixels[:, 0].min() + width / 2.0)
         side = max(float(width), float(height))
         return (
-            (column - self._centre_px) / alignment.slope_px_per_m,
+            (column - self._centre_px) / alignment.slope_px_per_m + place.v_m,
             alignment.side_px_m / side - alignment.distance_m,
         )
 

@@ -18,16 +18,16 @@ from robot_formation import names
 from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.experiment.path_plan import STRAIGHT, formation, swept_by
+from robot_formation.experiment.slot_check import LEAST_GAP_M, check_slots, sees_target
 from robot_formation.geometry.footprint import footprint_gap_m
-from robot_formation.geometry.se2 import Motion, into_frame
+from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.slots import Slots, leader_places
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.leader.paths import LeaderPath, PathKind
 from robot_formation.leader.rigid_formation import Formation, Track, around, centred_start, follower_step, track_of
 from robot_formation.parameters import ParameterError, from_mapping, to_mapping
 from robot_formation.surface import plate_size
 
-LEAST_GAP_M = 0.01
-"""Bodies that come nearer than this may touch: a formation is never exact."""
 _LENGTHS = ("amplitude_m", "step_m", "radius_m", "length_m")
 _SMALLER = tuple(0.95 - 0.05 * n for n in range(19))
 _LARGER = (1.25, 1.5, 2.0, 3.0, 5.0, 10.0)
@@ -54,16 +54,14 @@ class PathCheck:
         leader: the leader's parameters, its path among them.
         world: the robots' bodies, markers, cameras and starts, and the plate.
         drive: for the range.
-        distance_m: between neighbours in formation.
-        followers: how many.
+        slots: the followers' places, each in its neighbour's frame.
         chosen: whether the start was chosen for the path.
     """
 
     leader: LeaderParameters
     world: WorldNodeParameters
     drive: DriveParameters
-    distance_m: float
-    followers: int
+    slots: Slots
     chosen: bool
 
     def require(self) -> None:
@@ -73,6 +71,7 @@ class PathCheck:
             ParameterError: with one line that says which robot fails in which timestep, and what would fit.
         """
         path = self.leader.make_path()
+        check_slots(self.slots, self.world, path.motion(1) if self.leader.path == STRAIGHT else Motion())
         self._require_start(path)
         problem = self.problem(path)
         if problem is None:
@@ -83,15 +82,18 @@ class PathCheck:
         )
 
     def _require_start(self, path: LeaderPath) -> None:
-        """Check that the robots of a chain stand on the plate over their whole width.
+        """Check that the robots of a chain stand on the plate over their whole width, and with all wheels where they
+        are not abreast.
 
         The paper's tracks begin with all rear wheels at the edge; with those of one side beyond it a robot turns and
         pushes the others.
         """
-        if self.followers < 2 or self.chosen or not self.world.leaving_ends_run:
+        abreast = all(place.x_m == 0.0 for place in self.slots)
+        if (len(self.slots) < 2 and abreast) or self.chosen or not self.world.leaving_ends_run:
             return
         start = self._start(path)
-        whole = replace(formation(self.world, self.followers, self.distance_m), length_m=0.0)
+        wheels_m = 0.0 if abreast else self.world.wheels.wheelbase_m
+        whole = replace(formation(self.world, self.slots), length_m=wheels_m)
         pose = np.array([(start.x_m, start.y_m, start.yaw_rad)])
         for number, robot in enumerate(self._robots):
             box = whole.boxes(pose, [number])
@@ -100,9 +102,22 @@ class PathCheck:
                 larger = f" or a plate of {size_m:.2f} m (world.surface_parameters=[size_m={size_m:.2f}])"
                 raise ParameterError(
                     f"{robot} would stand with a part of its body beyond the plate of {self._plate_m:g} x "
-                    f"{self._plate_m:g} m; take fewer followers, another start_x_m and start_y_m"
+                    f"{self._plate_m:g} m; take fewer followers, another {self._start_on_plate(start, whole)}"
                     f"{larger if size_m > self._plate_m and box.min() >= 0.0 else ''}"
                 )
+
+    def _start_on_plate(self, start: Motion, whole: Formation) -> str:
+        """Say from where all of a formation stands on the plate, whole centimetres, as far as it does."""
+        low_x, high_x, low_y, high_y = map(float, whole.boxes(np.array([(start.x_m, start.y_m, start.yaw_rad)]))[0])
+        if max(high_x - low_x, high_y - low_y) > self._plate_m:
+            return "start_x_m and start_y_m"
+        chosen = []
+        for name, now, low, high in (("start_x_m", start.x_m, low_x, high_x), ("start_y_m", start.y_m, low_y, high_y)):
+            if low < 0.0:
+                chosen.append(f"{name}={_up(now - low):g}")
+            elif high > self._plate_m:
+                chosen.append(f"{name}={-_up(high - self._plate_m - now):g}")
+        return f"start ({', '.join(chosen)} would do)"
 
     def problem(self, path: LeaderPath) -> Problem | None:
         """Find the first reason why a path can't be followed; None if it can."""
@@ -115,21 +130,21 @@ class PathCheck:
         return next(found, None) or self._off_plate(path)
 
     def _of_step(self, step: Motion, timestep: int) -> Iterator[Problem]:
-        steps = [follower_step(step, number, self.distance_m) for number in range(self.followers + 1)]
+        steps = [follower_step(step, place) for place in leader_places(self.slots)]
         for robot, own in zip(self._robots, steps, strict=True):
             if text := self._beyond_range(own):
                 yield Problem(robot, timestep, text)
         if self.leader.path == STRAIGHT:
             return
-        for robot, own, neighbour in zip(self._robots[1:], steps[1:], steps, strict=False):
-            if self._least_gap_m(own, neighbour) < LEAST_GAP_M:
+        for robot, place, own, neighbour in zip(self._robots[1:], self.slots, steps[1:], steps, strict=False):
+            if self._least_gap_m(place, own, neighbour) < LEAST_GAP_M:
                 yield Problem(robot, timestep, "and its neighbour would come within a centimetre of each other")
-            if not self._in_view(neighbour):
+            if not sees_target(self.world, place, neighbour):
                 yield Problem(robot, timestep, "would not have its neighbour's marker in its camera's view")
 
     @property
     def _robots(self) -> list[str]:
-        return [names.LEADER, *(names.follower(n) for n in range(1, self.followers + 1))]
+        return [names.LEADER, *(names.follower(n) for n in range(1, len(self.slots) + 1))]
 
     def _beyond_range(self, step: Motion) -> str:
         turn, forward, left = step.legs
@@ -145,32 +160,21 @@ class PathCheck:
                 )
         return ""
 
-    def _least_gap_m(self, own: Motion, neighbour: Motion) -> float:
+    def _least_gap_m(self, place: Motion, own: Motion, neighbour: Motion) -> float:
         """Least gap of the two bodies while first the neighbour and then the follower makes its legs, metres.
 
         Where it can't be small, a lower bound of it.
         """
         length_m, width_m = self.world.chassis.length_m, self.world.chassis.width_m
         swing_m = math.hypot(length_m, width_m) * (abs(own.yaw_rad) + abs(neighbour.yaw_rad))
-        bound_m = self.distance_m - width_m - abs(own.y_m) - abs(neighbour.y_m) - swing_m
+        bound_m = place.u_m - width_m - abs(own.y_m) - abs(neighbour.y_m) - swing_m
         if bound_m > LEAST_GAP_M:
             return bound_m
-        place = Motion(0.0, self.distance_m)
-        gaps = [footprint_gap_m(place.then(at), length_m, width_m) for at in _legs(neighbour)]
-        after = place.then(neighbour)
+        there = place.inverse()
+        gaps = [footprint_gap_m(there.then(at), length_m, width_m) for at in _legs(neighbour)]
+        after = there.then(neighbour)
         gaps += [footprint_gap_m(after.relative_to(at), length_m, width_m) for at in _legs(own)]
         return min(gaps)
-
-    def _in_view(self, neighbour: Motion) -> bool:
-        """Whether a follower that hasn't moved yet has all of the Target face between its picture's sides."""
-        camera, half_m = self.world.camera, 0.5 * self.world.marker.edge_m
-        marker = Motion(0.0, self.distance_m).then(neighbour)
-        for along in (-half_m, half_m):
-            edge = marker.then(Motion(along, -half_m))
-            ahead, left = into_frame(edge.x_m - camera.x_m, edge.y_m - camera.y_m, math.radians(camera.pan_deg))
-            if ahead <= 0.0 or not 0.0 <= camera.centre_x_px - camera.focal_length_px * left / ahead < camera.width_px:
-                return False
-        return True
 
     def _off_plate(self, path: LeaderPath) -> Problem | None:
         """Find the first body beyond the plate's edge; on a straight path the first reference dot, like the world."""
@@ -196,7 +200,7 @@ class PathCheck:
 
     def _leaves(self, pose: NDArray[np.float64], timestep: int) -> Problem:
         """Say which robot is off the plate with the leader at a pose."""
-        off = [self._off(self._whole.boxes(pose[None], [number]))[0] for number in range(self.followers + 1)]
+        off = [self._off(self._whole.boxes(pose[None], [number]))[0] for number in range(len(self.slots) + 1)]
         return Problem(self._robots[off.index(True)], timestep, self._beyond, plate=True)
 
     @property
@@ -210,7 +214,7 @@ class PathCheck:
 
     @property
     def _whole(self) -> Formation:
-        whole = formation(self.world, self.followers, self.distance_m)
+        whole = formation(self.world, self.slots)
         return replace(whole, length_m=0.0, width_m=0.0) if self.leader.path == STRAIGHT else whole
 
     @property

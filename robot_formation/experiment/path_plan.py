@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.slots import Slots, leader_places
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.leader.paths import PATHS, LeaderPath
 from robot_formation.leader.rigid_formation import (
@@ -45,15 +46,15 @@ KNOWN_STEP: Mapping[str, Mapping[str, tuple[str, float]]] = MappingProxyType(
 """Parameters that say a follower's first step, by node: its component and the largest value."""
 
 
-def known_step(
-    kind: str, leader: LeaderParameters, number: int, distance_m: float, settings: Mapping[str, object]
-) -> dict[str, object]:
-    """Return a node's parameters that say the first step of follower `number`, apart from those that are set.
+def known_step(kind: str, leader: LeaderParameters, place: Motion, settings: Mapping[str, object]) -> dict[str, object]:
+    """Return a node's parameters that say the first step of a follower, apart from those that are set.
+
+    Its place is given in the leader's frame.
 
     A path that can't be made says nothing here: `Scenario.check` tells what is wrong with it.
     """
     try:
-        step = follower_step(leader.make_path().motion(1), number, distance_m)
+        step = follower_step(leader.make_path().motion(1), place)
     except ParameterError:
         return {}
     parts = {"u": step.u_m + 0.0, "v": step.v_m, "turn": step.yaw_rad}
@@ -64,7 +65,7 @@ def known_step(
     }
 
 
-def prediction_bounds(leader: LeaderParameters, distance_m: float, world: WorldNodeParameters) -> dict[str, float]:
+def prediction_bounds(leader: LeaderParameters, slots: Slots, world: WorldNodeParameters) -> dict[str, float]:
     """Return the fine-tuner's bounds of prediction moves for a path; those of straight ones are its defaults.
 
     A sideways step that is cut loses the residual that it was to take out too; one as long as the bodies' gap would
@@ -72,12 +73,12 @@ def prediction_bounds(leader: LeaderParameters, distance_m: float, world: WorldN
     """
     if leader.path == STRAIGHT:
         return {}
-    gap_m = distance_m - world.chassis.width_m - _TOUCH_M
+    gap_m = min(place.u_m for place in slots) - world.chassis.width_m - _TOUCH_M
     return {"max_v_m": _LONGEST_V_M, "max_u_m": min(max(gap_m, 0.0), _LONGEST_U_M)}
 
 
 def path_start(
-    leader: LeaderParameters, followers: int, heading_deg: float, distance_m: float, world: WorldNodeParameters
+    leader: LeaderParameters, slots: Slots, heading_deg: float, world: WorldNodeParameters
 ) -> tuple[float, float] | None:
     """Return the start that puts everything that the formation sweeps in the plate's middle; None for `straight`.
 
@@ -90,7 +91,7 @@ def path_start(
         path = replace(leader, room_m=()).make_path()
     except ParameterError:
         return None
-    whole = formation(world, followers, distance_m)
+    whole = formation(world, slots)
     found = centred_start(swept_by(path, leader.timesteps, whole, math.radians(heading_deg)), plate_m)
     # A path that is too large starts somewhere on the plate: `Scenario.check` then tells what is too large.
     x_m, y_m = (min(max(value, 0.0), plate_m) for value in found)
@@ -106,9 +107,7 @@ def swept_by(path: LeaderPath, timesteps: int, whole: Formation, heading_rad: fl
     return swept
 
 
-def with_room(
-    leader: LeaderParameters, world: WorldNodeParameters, followers: int, distance_m: float
-) -> LeaderParameters:
+def with_room(leader: LeaderParameters, world: WorldNodeParameters, slots: Slots) -> LeaderParameters:
     """Tell a random walk how far it may go."""
     if leader.path != _WALK:
         return leader
@@ -117,10 +116,10 @@ def with_room(
     except ParameterError:
         return leader
     start = Motion(world.start_x_m[0], world.start_y_m[0], world.start_heading_rad[0])
-    room = room_around(formation(world, followers, distance_m), start, plate_m)
+    room = room_around(formation(world, slots), start, plate_m)
     return replace(leader, room_m=(room.ahead_m, room.behind_m, room.left_m, room.right_m))
 
 
-def formation(world: WorldNodeParameters, followers: int, distance_m: float) -> Formation:
+def formation(world: WorldNodeParameters, slots: Slots) -> Formation:
     """Return the formation of a world's robots."""
-    return Formation(followers, distance_m, world.chassis.length_m, world.chassis.width_m)
+    return Formation(leader_places(slots), world.chassis.length_m, world.chassis.width_m)

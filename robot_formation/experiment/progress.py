@@ -10,7 +10,8 @@ from functools import partial
 
 from robot_formation import conversions, names
 from robot_formation.follower.alignment_state import AlignmentState
-from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.slots import Slots
 from robot_formation.names import Message
 
 _SAME = 1e-6  # metres and radians
@@ -84,11 +85,10 @@ class Progress:
 
     def __init__(
         self,
-        followers: int,
+        slots: Slots,
         timesteps: int,
         say: Callable[[str], None],
         elapsed: Callable[[], float],
-        formation_distance_m: float = FORMATION_DISTANCE_M,
         *,
         delayed: bool = False,
     ) -> None:
@@ -96,8 +96,8 @@ class Progress:
         self._timesteps = timesteps
         self._say = say
         self._elapsed = elapsed
-        self._place = Motion(y_m=-formation_distance_m)  # in formation, in the neighbour's frame
-        self._followers = [names.follower(n) for n in range(1, followers + 1)]
+        self._places = {names.follower(n): place for n, place in enumerate(slots, 1)}
+        self._followers = list(self._places)
         self._heard = {robot: _Heard() for robot in (names.LEADER, *self._followers)}
         self._handlers: dict[str, Callable[[Message], None]] = {}
         for robot in self._heard:
@@ -187,7 +187,7 @@ class Progress:
 
     def _say_line(self, robot: str, timestep: int, corrections: list[Motion], own: Motion, neighbour: Motion) -> None:
         correction_m = sum(abs(move.x_m) + abs(move.y_m) for move in corrections)
-        place = neighbour.then(self._place)
+        place = neighbour.then(self._places[robot])
         error_m = math.hypot(own.x_m - place.x_m, own.y_m - place.y_m)
         who = f"{robot}  " if len(self._followers) > 1 else ""
         self._say(

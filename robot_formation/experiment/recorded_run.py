@@ -12,7 +12,7 @@ from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.provenance import versions
 from robot_formation.bag.reader import Bag
-from robot_formation.bag.run_details import mapping, node_parameters
+from robot_formation.bag.run_details import mapping, node_parameters, said_slots
 from robot_formation.components.base import Component, Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.node_defaults import node_defaults
@@ -43,6 +43,7 @@ class Recording:
             raise BagError(f"{bag.path} has no topics of a follower; give the bag of 'formation run'")
         details = bag.metadata(METADATA_NAME)
         self._parameters = node_parameters(details)
+        self._slots = said_slots(details)
         self.notes = _changes({**mapping(details, "versions"), "commit": details.get("git_commit", "")})
         if not self._parameters:
             self.notes.append("the bag doesn't tell the nodes' parameters: the defaults are taken")
@@ -74,6 +75,14 @@ class Recording:
             BagError: they have another type, or the bag is corrupted.
         """
         return list(self.messages(robot, topic)) if self.has(robot, topic) else []
+
+    def place(self, robot: str) -> JsonObject:
+        """Return the fine-tuner's parameters that say a follower's place; none if the run doesn't say it."""
+        number = names.follower_number(robot)
+        if number > len(self._slots):
+            return {}
+        lateral_m, ahead_m = self._slots[number - 1]
+        return {"formation_distance_m": lateral_m, "formation_ahead_m": ahead_m}
 
     def parameters(self, kind: str, changes: JsonObject) -> Any:
         """Make a node's parameter object: as recorded, with some changed.

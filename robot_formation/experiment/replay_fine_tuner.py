@@ -12,7 +12,7 @@ from __future__ import annotations
 import copy
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from robot_formation import conversions, names
@@ -100,7 +100,11 @@ def replay_fine_tuner(recording: Recording, changes: JsonObject) -> list[FineTun
             f"a fine-tuner can't be replayed from a run by the schedule '{parameters.schedule}', whose "
             "followers wait for no neighbour's tick; replay runs by turns or wave"
         )
-    return [_Driver(recording, robot, parameters).run() for robot in recording.followers]
+    found = []
+    for robot in recording.followers:
+        place = {name: value for name, value in recording.place(robot).items() if name not in changes}
+        found.append(_Driver(recording, robot, replace(parameters, **place)).run())
+    return found
 
 
 @dataclass

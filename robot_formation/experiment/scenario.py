@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from robot_formation.components.node_parameters import (
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.chain_defaults import backdrop, unchecked_headings
+from robot_formation.experiment.formations import ABREAST, FORMATIONS, slots_of, starts_of
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.experiment.overhead_defaults import (
     overhead_calibrations,
@@ -38,9 +38,11 @@ from robot_formation.experiment.path_plan import (
 )
 from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.follower.fine_tuning import AlignmentModeName
+from robot_formation.geometry.slots import Slots, leader_places
 from robot_formation.koopman.predictors import PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.parameters import (
+    LENGTH_PAIRS,
     PAIRS,
     ParameterError,
     check_as,
@@ -86,6 +88,7 @@ FOLLOWS_FROM_SETUP = {
     },
     "fine_tuner": {
         "done_listeners": "'followers'",
+        "formation_ahead_m": "'formation' or 'slots' of the scenario",
         "blackouts": "'blackouts' of the scenario",
         "schedule": "'schedule' of the scenario",
         "spacing": "'spacing' of the scenario",
@@ -110,6 +113,17 @@ class Setup:
     spacing: Spacing = parameter(
         Spacing.RIGID,
         "What a follower's place is: beside its neighbour, or (delayed) where that was one timestep earlier",
+    )
+    formation: str = parameter(
+        ABREAST, "Where the followers' places are; echelon: each a little behind the one before", known=FORMATIONS
+    )
+    slots: LENGTH_PAIRS = parameter(
+        (),
+        "Places of one's own in place of 'formation', each from the robot on the left: pairs of distance to the right "
+        "and offset ahead (negative: behind), like [[0.32, -0.05]], one for each follower or one for all",
+        unit="m",
+        low=-2.0,
+        high=2.0,
     )
     start_x_m: float = parameter(0.763, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
     start_y_m: float = parameter(0.158, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
@@ -156,6 +170,11 @@ class Scenario:
         """Names of the robots, the leader first."""
         return _robots(self.setup)
 
+    @property
+    def slots(self) -> Slots:
+        """The followers' places, each in its neighbour's frame."""
+        return _slots(self.setup, self.fine_tuner.formation_distance_m)
+
     def node(self, kind: NodeKind[P]) -> P:
         """Return the parameters of a kind of node."""
         found: P = getattr(self, kind.name)
@@ -166,7 +185,13 @@ class Scenario:
         found = self.node(kind)
         if isinstance(found, FineTunerNodeParameters):
             # The leader hears every follower, a follower the one on its left.
-            found = replace(found, done_listeners=1 if robot == self.robots[-1] else 2)
+            place = self.slots[self.robots.index(robot) - 1]
+            found = replace(
+                found,
+                done_listeners=1 if robot == self.robots[-1] else 2,
+                formation_distance_m=place.u_m,
+                formation_ahead_m=place.v_m,
+            )
         if kind.name in KNOWN_STEP and (number := self.robots.index(robot)) > 1:
             values = {**to_mapping(found), **self._known_step(kind.name, number)}
             return from_mapping(kind.parameter_class(), values, where=kind.name)
@@ -176,7 +201,7 @@ class Scenario:
         if self.setup.spacing is Spacing.DELAYED:  # its neighbour stands still in timestep 1
             own = self.settings.get(kind, {})
             return {name: 0.0 for name in KNOWN_STEP[kind] if name not in own}
-        return known_step(kind, self.leader, number, self.fine_tuner.formation_distance_m, self.settings.get(kind, {}))
+        return known_step(kind, self.leader, leader_places(self.slots)[number], self.settings.get(kind, {}))
 
     def by_node(self) -> dict[str, dict[str, object]]:
         """List all parameters as plain values: by node, then by dotted name."""
@@ -200,6 +225,8 @@ class Scenario:
                 f"'blackouts' last until timestep {last}, but the run has only {self.leader.timesteps} timesteps; "
                 "shorten them or raise 'leader.timesteps'"
             )
+        for robot in self.robots[1:]:
+            self.of_robot(KINDS["fine_tuner"], robot)  # refuses a place that its mode can't keep
         fastest = self.world.motor.max_speed_rad_s
         if self.drive.wheel_speed_rad_s > fastest:
             raise ParameterError(
@@ -239,8 +266,7 @@ class Scenario:
             ParameterError: naming the robot, the timestep and what would fit.
         """
         chosen = self.leader.path != STRAIGHT and not any(entry in self.given for entry in START)
-        distance_m = self.fine_tuner.formation_distance_m
-        PathCheck(leader or self.leader, self.world, self.drive, distance_m, self.setup.followers, chosen).require()
+        PathCheck(leader or self.leader, self.world, self.drive, self.slots, chosen).require()
 
 
 def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> Scenario:
@@ -261,9 +287,11 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
 
     leader = made(LeaderParameters, "leader", followers=_robots(setup)[1:], seed=setup.seed, schedule=setup.schedule)
     timed = {"schedule": setup.schedule, "timesteps": leader.timesteps, "period_s": leader.period_s}
-    distance_m = made(FineTunerNodeParameters, "fine_tuner").formation_distance_m
+    if setup.slots and "formation_distance_m" in settings.get("fine_tuner", {}):
+        raise ParameterError("'slots' say the distances, and 'fine_tuner.formation_distance_m' does too; keep one")
+    slots = _slots(setup, made(FineTunerNodeParameters, "fine_tuner").formation_distance_m)
     ground = made(WorldNodeParameters, "world")
-    x_m, y_m = path_start(leader, setup.followers, setup.heading_deg, distance_m, ground) or (
+    x_m, y_m = path_start(leader, slots, setup.heading_deg, ground) or (
         setup.start_x_m,
         setup.start_y_m,
     )
@@ -273,14 +301,20 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         start_y_m=setup.start_y_m if "start_y_m" in given else y_m,
     )
     own, size_m = settings.get("world", {}), _plate_size(ground)
-    follows = {**backdrop(setup.followers, own), **overhead_camera(size_m, own)}
-    world = made(WorldNodeParameters, "world", **_starts(setup, distance_m), **timed, **follows)
+    follows = {
+        "seed": setup.seed,
+        "robots": _robots(setup),
+        **starts_of(setup.start_x_m, setup.start_y_m, setup.heading_deg, slots),
+        **backdrop(setup.followers, own),
+        **overhead_camera(size_m, own),
+    }
+    world = made(WorldNodeParameters, "world", **timed, **follows)
     tracker = settings.get("overhead_tracker", {})
     known = {name: getattr(world, name) for name in _KNOWN_FROM_ABOVE if name not in tracker}
     known |= overhead_calibrations(size_m, own, tracker)
-    bounds = prediction_bounds(leader, distance_m, ground)
+    bounds = prediction_bounds(leader, slots, ground)
     bounds = {name: value for name, value in bounds.items() if name not in settings.get("fine_tuner", {})}
-    first = {kind: known_step(kind, leader, 1, distance_m, settings.get(kind, {})) for kind in KNOWN_STEP}
+    first = {kind: known_step(kind, leader, slots[0], settings.get(kind, {})) for kind in KNOWN_STEP}
     return Scenario(
         setup,
         settings,
@@ -295,12 +329,14 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
             "fine_tuner",
             blackouts=setup.flat_blackouts,
             spacing=setup.spacing,
+            formation_distance_m=slots[0].u_m,
+            formation_ahead_m=slots[0].v_m,
             **timed,
             **unchecked_headings(setup.schedule, settings.get("fine_tuner", {})),
             **first["fine_tuner"],
             **bounds,
         ),
-        with_room(leader, world, setup.followers, distance_m),
+        with_room(leader, world, slots),
     )
 
 
@@ -319,18 +355,8 @@ def _robots(setup: Setup) -> list[str]:
     return [names.LEADER, *(names.follower(n) for n in range(1, setup.followers + 1))]
 
 
-def _starts(setup: Setup, distance_m: float) -> dict[str, object]:
-    """Return the world's parameters that follow from the setup: each robot stands on the right of the one before."""
-    robots, heading = _robots(setup), math.radians(setup.heading_deg)
-    right = (math.sin(heading), -math.cos(heading))
-    places = [distance_m * n for n in range(len(robots))]
-    return {
-        "seed": setup.seed,
-        "robots": robots,
-        "start_x_m": [setup.start_x_m + d * right[0] for d in places],
-        "start_y_m": [setup.start_y_m + d * right[1] for d in places],
-        "start_heading_rad": [heading] * len(robots),
-    }
+def _slots(setup: Setup, distance_m: float) -> Slots:
+    return slots_of(setup.formation, setup.slots, setup.followers, distance_m)
 
 
 def presets() -> dict[str, Path]:

@@ -149,7 +149,7 @@ class Plan:
     def conditions(self) -> JsonObject:
         """List the conditions of all runs by name, as those of a single run."""
         scenario = build(Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0]), self.settings)
-        found = conditions(scenario.by_node())
+        found = conditions(scenario.by_node(), [place.uv_m for place in scenario.slots])
         return {**found, "in_process": True}
 
     def tasks(self) -> Iterator[Task]:

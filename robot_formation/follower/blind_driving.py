@@ -42,17 +42,17 @@ def blind_timesteps(blackouts: Sequence[int], where: str = "fine_tuner: 'blackou
     return frozenset(found)
 
 
-def out_of_view(way: UncertainMotion | None, formation_distance_m: float, bounds: PlannerParameters) -> str:
+def out_of_view(way: UncertainMotion | None, place: Motion, bounds: PlannerParameters) -> str:
     """Say why the neighbour may be out of view; nothing if its 90 % ellipse is within view and apart from the body.
 
     Args:
         way: the expected way to the formation position, from where the follower will stand.
-        formation_distance_m: distance beside the neighbour that is kept.
+        place: that position in the neighbour's frame.
         bounds: the camera's view and the bodies.
     """
     if way is None:
         return "nothing is known of where the neighbour is"
-    neighbour = way.then(UncertainMotion(Motion(y_m=formation_distance_m)))
+    neighbour = way.then(UncertainMotion(place.inverse()))
     x, y = neighbour.mean.x_m, neighbour.mean.y_m
     covariance = neighbour.matrix[:2, :2]
     distance = max(math.hypot(x, y), 1e-6)

@@ -79,6 +79,13 @@ class FineTunerParameters:
         low=0.05,
         high=2.0,
     )
+    formation_ahead_m: float = parameter(
+        0.0,
+        "Offset ahead of the neighbour that is kept, between the same origins, along v; negative: behind",
+        unit="m",
+        low=-0.5,
+        high=0.5,
+    )
     # The bodies are 8 cm apart in a formation of 32 cm: a wild forecast must not push the neighbour.
     max_v_m: float = parameter(
         0.1,
@@ -108,16 +115,21 @@ class FineTunerParameters:
     precise: PreciseParameters = PreciseParameters()
 
     def __post_init__(self) -> None:
-        """Check that the mode can keep the formation distance, and the blackouts."""
+        """Check that the mode can keep the place, and the blackouts."""
         blind_timesteps(self.blackouts)
         if self.mode is AlignmentModeName.PAPER:
-            self.alignment.at_distance(self.formation_distance_m)
+            self.alignment.check_place(self.place)
         least_m = self.precise.approach.body_width_m + self.precise.approach.clearance_m
         if self.mode is AlignmentModeName.PRECISE and self.formation_distance_m < least_m:
             raise ParameterError(
                 f"fine_tuner: 'formation_distance_m' of {self.formation_distance_m} leaves less than "
                 f"'precise.approach.clearance_m' between the bodies; it must be at least {least_m:.3f}"
             )
+
+    @property
+    def place(self) -> Motion:
+        """The place to keep, in the neighbour's frame."""
+        return Motion(self.formation_ahead_m, -self.formation_distance_m)
 
 
 @dataclass(frozen=True)
@@ -326,7 +338,7 @@ class FineTuner:
             self._out_of_view = True
             expected = self._alignment.ahead()
             end = None if expected is None else expected.after(motion)
-            reason = out_of_view(end, self._p.formation_distance_m, self._p.precise.approach)
+            reason = out_of_view(end, self._p.place, self._p.precise.approach)
             blind = [State(AlignmentState.BLIND, f"holding still: {reason}" if reason else "driving by forecast")]
             motion = Motion() if reason else motion
         self._planned_move = motion
@@ -439,5 +451,5 @@ def _clip(value: float, bound: float) -> float:
 
 def _mode(parameters: FineTunerParameters) -> AlignmentMode:
     if parameters.mode is AlignmentModeName.PAPER:
-        return PaperMode(parameters.alignment.at_distance(parameters.formation_distance_m))
-    return PreciseAlignment(parameters.precise, parameters.formation_distance_m)
+        return PaperMode(parameters.alignment.at_place(parameters.place))
+    return PreciseAlignment(parameters.precise, parameters.place)

@@ -100,10 +100,10 @@ def into_frame(x_m: float, y_m: float, heading_rad: float) -> tuple[float, float
     return cosine * x_m + sine * y_m, cosine * y_m - sine * x_m
 
 
-def formation_error_uv_m(follower: Motion, neighbour: Motion, distance_m: float) -> tuple[float, float]:
+def formation_error_uv_m(follower: Motion, neighbour: Motion, place: Motion) -> tuple[float, float]:
     """Formation error (u, v) in the beacon neighbour's frame, metres, of two poses in the world.
 
-    Zero when the follower's origin lies `distance_m` to the right of its neighbour's.
+    Zero when the follower's origin lies at its `place` in the neighbour's frame.
     """
     u_m, v_m = follower.relative_to(neighbour).uv_m
-    return u_m - distance_m, v_m
+    return u_m - place.u_m, v_m - place.v_m

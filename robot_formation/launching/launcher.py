@@ -140,11 +140,10 @@ class Launcher:
         began = time.monotonic()
         scenario = self.scenario
         progress = Progress(
-            scenario.setup.followers,
+            scenario.slots,
             scenario.leader.timesteps,
             self._tell,
             lambda: time.monotonic() - began,
-            scenario.fine_tuner.formation_distance_m,
             delayed=scenario.setup.spacing is Spacing.DELAYED,
         )
         # The monitor joins first: the nodes then know of it before they send anything.

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from robot_formation import names
 from robot_formation.bag.provenance import versions
+from robot_formation.bag.run_details import slots_text
 from robot_formation.calibration.camera_check import camera_values
 from robot_formation.calibration.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario
@@ -75,7 +76,7 @@ def progress(scenario: Scenario, namespace: str) -> Process:
     parameters = {
         "followers": scenario.setup.followers,
         "timesteps": scenario.leader.timesteps,
-        "formation_distance_m": scenario.fine_tuner.formation_distance_m,
+        "slots": [length for place in scenario.slots for length in place.uv_m],
         "delayed": scenario.setup.spacing is Spacing.DELAYED,
     }
     return Process(names.PROGRESS, namespace, parameters)
@@ -99,6 +100,7 @@ def run_metadata(scenario: Scenario) -> dict[str, str]:
         "surface": world.surface,
         "surface_parameters": json.dumps(dict(text.split("=", 1) for text in world.surface_parameters)),
         "timesteps": str(scenario.leader.timesteps),
+        "slots": slots_text(scenario.slots),
         "camera": world.camera.mode.value,
         "parameters": json.dumps(scenario.by_node(), sort_keys=True),
         "drive_curves": json.dumps(robot_curves(scenario.drive, scenario.robots)),

@@ -18,30 +18,27 @@ MARGIN_M = 0.05
 """Left free around the bodies where a start is chosen: robots slip, and a formation is never exact."""
 
 
-def follower_step(step: Motion, number: int, distance_m: float) -> Motion:
-    """Return the motion of follower `number` (from 1; 0: the leader's own) that keeps its place during a leader's step.
+def follower_step(step: Motion, place: Motion) -> Motion:
+    """Return the motion that keeps a `place` in the leader's frame during a leader's step.
 
-    T_n = O^-1 T O, where O leads from the leader to the follower's place, number * distance_m to its right.
+    T_n = O^-1 T O, where O leads from the leader to the place.
     """
     if not step.yaw_rad:
         return step  # the same for all, without rounding
-    place = Motion(0.0, -number * distance_m)
     return place.inverse().then(step).then(place)
 
 
 @dataclass(frozen=True)
 class Formation:
-    """A rigid formation: the leader and followers beside it, each `distance_m` to the right of the one before.
+    """A rigid formation: the leader and its followers.
 
     Attributes:
-        followers: how many.
-        distance_m: between the origins of base_link.
+        places: of all robots in the leader's frame, the leader's own first.
         length_m: of a body, along x.
         width_m: of a body, along y.
     """
 
-    followers: int
-    distance_m: float
+    places: Sequence[Motion]
     length_m: float
     width_m: float
 
@@ -58,10 +55,9 @@ class Formation:
         cosine, sine = np.cos(track[:, 2]), np.sin(track[:, 2])
         half_x = 0.5 * (np.abs(cosine) * self.length_m + np.abs(sine) * self.width_m)
         half_y = 0.5 * (np.abs(sine) * self.length_m + np.abs(cosine) * self.width_m)
-        # The robots stand in a row: those at its ends reach farthest.
-        places = [self.distance_m * number for number in robots or (0, self.followers)]
-        xs = np.array([track[:, 0] + place * sine for place in places])
-        ys = np.array([track[:, 1] - place * cosine for place in places])
+        places = [self.places[number] for number in robots or range(len(self.places))]
+        xs = np.array([track[:, 0] + (place.x_m * cosine - place.y_m * sine) for place in places])
+        ys = np.array([track[:, 1] + (place.x_m * sine + place.y_m * cosine) for place in places])
         return np.stack(
             [xs.min(0) - half_x, xs.max(0) + half_x, ys.min(0) - half_y, ys.max(0) + half_y],
             axis=1,

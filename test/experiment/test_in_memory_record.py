@@ -9,6 +9,7 @@ import pytest
 
 from robot_formation.analysis.from_bag import load_run, run_topics
 from robot_formation.analysis.quantities import analyse
+from robot_formation.bag.run_details import slots_text
 from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun, run_in_process
 from robot_formation.experiment.run_result import RunError
@@ -21,6 +22,7 @@ BASE = ["world.camera.mode=on_demand", "leader.timesteps=5", "predictor.name=for
 CASES = {
     "one follower": ["seed=1000"],
     "two followers under the overhead camera": ["seed=3", "followers=2", "leader.timesteps=4"],
+    "an echelon": ["followers=2", "formation=echelon", "start_y_m=0.3", "leader.timesteps=2"],
     "lost": ["world.camera.pan_deg=-90"],
 }
 
@@ -28,7 +30,11 @@ CASES = {
 @pytest.mark.parametrize("settings", CASES.values(), ids=CASES)
 def test_the_analysis_is_that_of_the_bag_of_the_same_run(tmp_path: Path, settings: list[str]) -> None:
     scenario = override(load_track("one"), [*BASE, *settings])
-    details = {"scenario": scenario.setup.name, "timesteps": str(scenario.leader.timesteps)}
+    details = {
+        "scenario": scenario.setup.name,
+        "timesteps": str(scenario.leader.timesteps),
+        "slots": slots_text(scenario.slots),
+    }
     result = run_in_process(scenario, tmp_path / "bag", details)
     recorded = load_run(tmp_path / "bag")
     record = run_in_memory(scenario)

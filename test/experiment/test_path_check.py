@@ -26,7 +26,7 @@ def scenario(path: str, *settings: str, parameters: str = "") -> Scenario:
 def boxes(made: Scenario) -> np.ndarray:
     """The bodies' boxes over a run, as the paths' plan has them."""
     start = Motion(made.setup.start_x_m, made.setup.start_y_m, math.radians(made.setup.heading_deg))
-    whole = formation(made.world, made.setup.followers, made.fine_tuner.formation_distance_m)
+    whole = formation(made.world, made.slots)
     return whole.boxes(track_of(made.leader.make_path(), made.leader.timesteps, start))
 
 

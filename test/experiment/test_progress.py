@@ -17,6 +17,7 @@ from robot_formation.analysis.quantities import analyse
 from robot_formation.bag.reader import read_bag
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.progress import Progress
+from robot_formation.geometry.slots import slot
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("progress")]
 
@@ -62,7 +63,7 @@ def told(
 ) -> list[tuple[tuple[str, int], tuple[str, str]]]:
     """The lines, parsed, when topics give their next messages in a given order."""
     lines: list[str] = []
-    progress = Progress(followers, timesteps, lines.append, lambda: 0.0)
+    progress = Progress([slot(0.32)] * followers, timesteps, lines.append, lambda: 0.0)
     queues = {topic: iter(group) for topic, group in messages.items()}
     for topic in order:
         progress.listen(topic, next(queues[topic]))
@@ -95,7 +96,7 @@ def test_every_line_says_what_the_table_says_in_any_order_of_the_topics(runs: di
     bag = runs[name]
     expected = table_of(bag)
     followers, timesteps = len({robot for robot, _ in expected}), max(t for _, t in expected)
-    progress = Progress(followers, timesteps, lambda text: None, lambda: 0.0)
+    progress = Progress([slot(0.32)] * followers, timesteps, lambda text: None, lambda: 0.0)
     messages = messages_of(bag, progress)
     assert set(messages) == set(progress.topics)
     with read_bag(bag) as opened:
@@ -115,14 +116,14 @@ def test_every_line_says_what_the_table_says_in_any_order_of_the_topics(runs: di
 
 def test_the_timesteps_of_a_follower_are_told_in_order(runs: dict[str, Path]) -> None:
     bag = runs["track_one_previous"]
-    messages = messages_of(bag, Progress(1, 15, print, lambda: 0.0))
+    messages = messages_of(bag, Progress([slot(0.32)], 15, print, lambda: 0.0))
     order = [topic for topic, group in messages.items() for _ in group]
     assert [t for (_, t), _ in told(messages, 1, 15, order)] == list(range(1, 16))
 
 
 def test_a_move_that_could_not_be_measured_does_not_silence_the_run(runs: dict[str, Path]) -> None:
     bag = runs["track_one_previous"]
-    progress = Progress(1, 15, print, lambda: 0.0)
+    progress = Progress([slot(0.32)], 15, print, lambda: 0.0)
     messages = messages_of(bag, progress)
     moved = f"/follower_1/{names.MOVED.name}"
     first = conversions.stamp_of(messages[f"/{names.LEADER}/{names.MOVED.name}"][0])
@@ -136,7 +137,7 @@ def test_a_move_that_could_not_be_measured_does_not_silence_the_run(runs: dict[s
 
 def test_a_reminder_says_where_each_follower_is() -> None:
     lines: list[str] = []
-    progress = Progress(1, 15, lines.append, lambda: 3.0)
+    progress = Progress([slot(0.32)], 15, lines.append, lambda: 3.0)
     progress.remind()
     for state in ("predict", "correct: far"):
         progress.listen(f"/follower_1/{names.ALIGNMENT.name}", conversions.string(state))

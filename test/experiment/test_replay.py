@@ -101,6 +101,14 @@ def test_a_predictor_gets_what_was_commanded_too_and_its_state_file_is_left_alon
     assert deaf.changed > 0
 
 
+def test_every_follower_is_shown_its_blocks_at_its_own_place(tmp_path: Path) -> None:
+    settings = ["followers=2", "slots=[[0.32, -0.05], [0.34, 0.0]]", "start_y_m=0.3", "world.camera.mode=on_demand"]
+    scenario = scenarios.override(scenarios.load_track("one"), [*settings, "leader.timesteps=2"])
+    run_in_process(scenario, tmp_path / "run", run_metadata(scenario))
+    with read_bag(tmp_path / "run") as bag:
+        assert [found.identical for found in replay_fine_tuner(Recording(bag), {})] == [True, True]
+
+
 def test_a_replay_goes_on_from_a_state_file_if_told(formation_run: Path) -> None:
     state = str(formation_run.parent / "{robot}.json")
     with read_bag(formation_run) as bag:

@@ -21,8 +21,11 @@ from robot_formation.follower.fine_tuning import (
     SendMove,
 )
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.slots import slot
 from robot_formation.geometry.uncertain_motion import TURN_UNKNOWN, UncertainMotion
 from robot_formation.parameters import ParameterError, from_mapping
+
+PLACE = slot(0.32)
 
 IN_PLACE = blocks_of(state_of())
 STEP = Motion(0.05)
@@ -120,13 +123,13 @@ def test_out_of_view_is_what_the_ellipse_of_the_neighbours_place_says(
     way: Motion, sigmas: tuple[float, float], words: str
 ) -> None:
     uncertain = UncertainMotion.of(way, np.diag([sigmas[0] ** 2, sigmas[1] ** 2, 0.0]))
-    said = out_of_view(uncertain, 0.32, PlannerParameters())
+    said = out_of_view(uncertain, PLACE, PlannerParameters())
     assert words in said
     assert bool(words) is bool(said)
 
 
 def test_nothing_known_is_out_of_view() -> None:
-    assert "nothing is known" in out_of_view(None, 0.32, PlannerParameters())
+    assert "nothing is known" in out_of_view(None, PLACE, PlannerParameters())
 
 
 def test_blackouts_become_timesteps() -> None:
@@ -164,4 +167,4 @@ def test_a_heading_that_nobody_knows_counts_as_exact_not_as_less_than_that() -> 
     unknown = UncertainMotion(Motion(), TURN_UNKNOWN)
     assert unknown.then(forecast(0.01)).matrix[1, 1] == pytest.approx(0.01**2)
     wide = [0.1**2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0]
-    assert "beside the picture" in out_of_view(UncertainMotion(Motion(), tuple(wide)), 0.32, PlannerParameters())
+    assert "beside the picture" in out_of_view(UncertainMotion(Motion(), tuple(wide)), PLACE, PlannerParameters())

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
+from robot_formation.geometry.slots import slot
 
 lengths = st.floats(-10.0, 10.0)
 angles = st.floats(-2 * math.pi, 2 * math.pi)
@@ -83,9 +84,9 @@ def test_legs_driven_one_after_the_other_make_the_motion(motion: Motion) -> None
     assert matrix(Motion.from_legs(*motion.legs)) == pytest.approx(matrix(motion), abs=1e-11)
 
 
-@given(neighbour=motions, u=st.floats(-0.1, 0.1), v=st.floats(-0.1, 0.1), yaw=angles)
+@given(neighbour=motions, u=st.floats(-0.1, 0.1), v=st.floats(-0.1, 0.1), yaw=angles, ahead=st.floats(-0.2, 0.2))
 def test_formation_error_does_not_depend_on_where_the_formation_stands(
-    neighbour: Motion, u: float, v: float, yaw: float
+    neighbour: Motion, u: float, v: float, yaw: float, ahead: float
 ) -> None:
-    follower = neighbour.then(Motion(v, -0.32 - u, yaw))
-    assert formation_error_uv_m(follower, neighbour, 0.32) == pytest.approx((u, v), abs=1e-9)
+    follower = neighbour.then(Motion(ahead + v, -0.32 - u, yaw))
+    assert formation_error_uv_m(follower, neighbour, slot(0.32, ahead)) == pytest.approx((u, v), abs=1e-9)

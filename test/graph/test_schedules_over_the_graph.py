@@ -21,7 +21,7 @@ GROUND = (
 )
 SLALOM = ("leader.path=slalom", "leader.path_parameters=[step_m=0.03, period=8]")
 CASES = [
-    ("schedule=wave",),
+    ("schedule=wave", "formation=echelon"),
     ("schedule=together", *SLALOM),  # its moves have two legs
     ("schedule=timer", "spacing=delayed", *SLALOM),
 ]

@@ -107,7 +107,8 @@ class PreciseParameters:
 class PreciseAlignment:
     """Keeps the estimate over the timesteps; one decision a look."""
 
-    def __init__(self, parameters: PreciseParameters, formation_distance_m: float) -> None:
+    def __init__(self, parameters: PreciseParameters, place: Motion) -> None:
+        """Begin without an estimate; the `place` to keep is given in the neighbour's frame."""
         self._p = parameters
         drive = parameters.actuation
         self._filter = PoseFilter(
@@ -124,7 +125,7 @@ class PreciseAlignment:
         self._stepped = False  # the neighbour, and no look since then
         self._expected_rad: float | None = None  # the heading, while it is checked
         self._doubted = False  # whether the check has begun to move
-        self._formation = Motion(y_m=-formation_distance_m)  # position in the neighbour's frame
+        self._formation = place
         self._moves = 0
         self._timestep = 0
         self._last = Motion()
@@ -315,7 +316,7 @@ class PreciseAlignment:
         return not self._filter.whole(boxes) or (self._filter.known and self._filter.nis(boxes) >= _IMPLAUSIBLE_NIS)
 
     def _placed(self, state: Vector) -> bool:
-        return math.hypot(state[X], state[Y] + self._formation.y_m) < self._p.placed_m
+        return math.hypot(state[X] + self._formation.x_m, state[Y] + self._formation.y_m) < self._p.placed_m
 
     def _within(self, way: Motion) -> bool:
         p = self._p

@@ -13,13 +13,14 @@ from rclpy.executors import Executor
 from robot_formation import conversions, exit_codes
 from robot_formation.experiment.progress import Progress
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
+from robot_formation.geometry.slots import Slots, slot
 from robot_formation.names import Message
 from robot_formation.nodes.host.component_node import qos_profile
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.ros_parameters import ParameterNode, declare
 from robot_formation.nodes.host.signals import stopped
 from robot_formation.nodes.progress.monitor import topic_of
-from robot_formation.parameters import parameter
+from robot_formation.parameters import ParameterError, parameter
 
 _IDLE_S = 0.1
 _ROUND_S = 0.03
@@ -32,14 +33,27 @@ class ProgressParameters:
 
     followers: int = parameter(1, "Number of followers", low=1, high=10)
     timesteps: int = parameter(15, "Timesteps of the run, for the lines", low=1, high=1_000_000)
-    formation_distance_m: float = parameter(
-        FORMATION_DISTANCE_M,
-        "The fine-tuners' formation distance, for the formation error",
+    slots: tuple[float, ...] = parameter(
+        (),
+        "Each follower's place, for the formation error: distance to its neighbour's right, offset ahead, one after "
+        "another; empty: 0.32 m beside",
         unit="m",
-        low=0.05,
+        low=-2.0,
         high=2.0,
     )
     delayed: bool = parameter(False, "Whether places are those of one timestep earlier, for the formation error")
+
+    def __post_init__(self) -> None:
+        """Check that each follower has a place."""
+        if len(self.slots) not in (0, 2 * self.followers):
+            raise ParameterError(
+                f"progress: 'slots' has {len(self.slots)} numbers, not two for each of {self.followers} followers"
+            )
+
+    def places(self) -> Slots:
+        """List the followers' places, each in its neighbour's frame."""
+        pairs = zip(self.slots[::2], self.slots[1::2], strict=True)
+        return [slot(*pair) for pair in pairs] or [slot(FORMATION_DISTANCE_M)] * self.followers
 
 
 class ProgressExecutable:
@@ -53,11 +67,10 @@ class ProgressExecutable:
         self._messages = 0
         began = time.monotonic()
         self._progress = Progress(
-            parameters.followers,
+            parameters.places(),
             parameters.timesteps,
             _say,
             lambda: time.monotonic() - began,
-            parameters.formation_distance_m,
             delayed=parameters.delayed,
         )
         for name in self._progress.topics:

@@ -11,6 +11,7 @@ from robot_formation.alignment.mode import Decision, Verdict
 from robot_formation.alignment.precise.marker_projection import Vector, after_motion, pose_of
 from robot_formation.alignment.precise.precise_mode import PreciseAlignment, PreciseParameters
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.geometry.slots import slot
 from robot_formation.geometry.uncertain_motion import UncertainMotion
 from robot_formation.vision.pixy2.block import Block
 
@@ -23,7 +24,7 @@ class Pair:
     """A follower that makes what is decided, exactly, and its neighbour."""
 
     def __init__(self, camera: Camera = blocks_of, max_moves: int = PreciseParameters.max_moves) -> None:
-        self.alignment = PreciseAlignment(PreciseParameters(max_moves=max_moves), FORMATION_DISTANCE_M)
+        self.alignment = PreciseAlignment(PreciseParameters(max_moves=max_moves), slot(FORMATION_DISTANCE_M))
         self.timestep = 1
         self.camera = camera
         self.truth = state_of()
