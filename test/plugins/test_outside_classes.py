@@ -222,10 +222,10 @@ def test_a_surface_needs_heights_only(module: Path) -> None:
     assert surface.heights(np.array([[0.0, 1.0]]), np.array([[0.5], [0.7]])).shape == (2, 2)
     assert surface.name == "mine:Slope"
     assert plate_size("mine:Flat") == 2.5
-    check_surface(type(surface))
-    check_surface(type(make_surface("mine:Made")))
+    check_surface(sys.modules["mine"].Slope)
+    check_surface(sys.modules["mine"].Made)
     assert (make_surface("mine:Made").height(0.0, 1.0), plate_size("mine:Made")) == (0.1, 1.78)
-    check_surface(type(make_surface("mine:Flat")))
+    check_surface(sys.modules["mine"].Flat)
     with pytest.raises(ParameterError, match="did you mean 'rise'"):
         surface_from_texts("mine:Slope", ["raise=0.1"])
     with pytest.raises(ParameterError, match="no method 'height'"):
@@ -257,7 +257,7 @@ def test_a_path_needs_motions_only(module: Path) -> None:
     )
     path = make_path("mine:Mine")
     assert path.motion(2) == Motion(0.05, 0.01)
-    check_path(type(path))
+    check_path(sys.modules["mine"].Mine)
     for name, says in (("Wrong", "the motion of timestep 1 failed: ValueError"), ("Endless", "is not finite")):
         with pytest.raises(ParameterError, match=says):
             make_path(f"mine:{name}").motion(1)
