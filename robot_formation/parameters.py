@@ -71,8 +71,9 @@ The namespace was absolute and is relative to that of the robots by default; and
 class Spec:
     """One parameter: dotted name, Python type, default, unit, closed range or choices, description.
 
-    `known` lists names that it can have where whoever uses them looks them up, and complains. Where the field's type is
-    a `Choice`, `choice` is that class, and type, default and choices are those of its words.
+    `known` lists names that it can have where whoever uses them looks them up, and complains. `also` says of a name
+    that is none of the choices whether it may be used too. Where the field's type is a `Choice`, `choice` is that
+    class, and type, default and choices are those of its words.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Spec:
     description: str
     known: tuple[str, ...] = ()
     choice: Callable[[object], Choice] | None = None
+    also: Callable[[str], bool] | None = None
 
     def plain_default(self) -> Any:
         """Return the default as YAML, ROS and JSON hold it: a list for a tuple."""
@@ -100,10 +102,15 @@ def parameter(
     high: float | None = None,
     choices: tuple[object, ...] = (),
     known: tuple[str, ...] = (),
+    also: Callable[[str], bool] | None = None,
 ) -> Any:
     """Make a dataclass field that carries what `Spec` lists: unit, closed range [low, high] or choices, description."""
-    metadata = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices, "known": known}
-    return dataclasses.field(default=default, metadata=metadata)
+    said = {"description": description, "unit": unit, "low": low, "high": high}
+    return dataclasses.field(default=default, metadata={**said, "choices": choices, "known": known, "also": also})
+
+
+_BARE = dict(parameter(None, "").metadata)
+"""Of fields that were not made by `parameter`, as in classes from outside the package."""
 
 
 def specs(cls: type, prefix: str = "", *, defaults: object = None) -> dict[str, Spec]:
@@ -124,7 +131,7 @@ def specs(cls: type, prefix: str = "", *, defaults: object = None) -> dict[str, 
             inner = None if inner is dataclasses.MISSING else inner
             found.update(specs(typing.cast(type, kind), name + ".", defaults=inner))
             continue
-        meta = field.metadata
+        meta = {**_BARE, **field.metadata}
         default = field.default if defaults is None else getattr(defaults, field.name)
         choice = kind if isinstance(kind, type) and issubclass(kind, Choice) else None
         found[name] = Spec(
@@ -138,6 +145,7 @@ def specs(cls: type, prefix: str = "", *, defaults: object = None) -> dict[str, 
             meta["description"],
             tuple(meta["known"]),
             choice,
+            meta["also"],
         )
     return found
 
@@ -336,7 +344,7 @@ def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:
             raise wrong
     elif not isinstance(value, kind):
         raise wrong
-    if spec.choices and value not in spec.choices:
+    if spec.choices and value not in spec.choices and not (spec.also and spec.also(str(value))):
         hint = suggestion(str(value), [str(c) for c in spec.choices])
         raise ParameterError(f"{subject} can't be {shown(value)}{hint}")
     low, high = spec.low, spec.high

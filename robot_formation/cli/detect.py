@@ -34,7 +34,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "images", metavar="IMAGE", type=Path, nargs="+", help="image file, 316 x 208 (others are scaled)"
     )
     parser.add_argument(
-        "--sensor", choices=("colours", "tags"), default="colours", help="what is looked for (default: colours)"
+        "--sensor", metavar="NAME", default="colours", help="colours (default), tags, or see 'formation list sensors'"
     )
     parser.add_argument(
         "--signatures", metavar="FILE", type=Path, help="taught signatures, YAML or JSON; needed for colours"
@@ -93,12 +93,18 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _detector(sensor: str, signatures: Path | None, parameters: DetectorParameters) -> BlockSensor:
+    from robot_formation.parameters import suggestion
     from robot_formation.vision.aruco_detector import TagDetector
     from robot_formation.vision.pixy2.detector import BlockDetector
     from robot_formation.vision.pixy2.signatures import load_signatures
+    from robot_formation.vision.sensors import SENSORS, is_outside_sensor, outside_sensor
 
+    if is_outside_sensor(sensor):
+        return outside_sensor(sensor, parameters)
     if sensor == "tags":
         return TagDetector(tracking=parameters)
+    if sensor not in SENSORS:
+        raise FormationError(f"--sensor: can't be '{sensor}'{suggestion(sensor, SENSORS)}")
     if signatures is None:
         raise FormationError("colours need --signatures FILE with what 'formation teach' has taught, or --sensor tags")
     return BlockDetector(load_signatures(signatures), parameters)
@@ -132,7 +138,7 @@ def _draw(folder: Path, number: int, path: Path, picture: Picture, blocks: list[
 
 
 def _check_mask(args: argparse.Namespace) -> None:
-    if args.sensor == "tags":
+    if args.sensor != "colours":
         raise FormationError("--mask shows what colours match; leave it out, or --sensor tags")
     if len(args.images) != 1:
         raise FormationError(f"--mask takes one image, not {len(args.images)}; give the images one by one")

@@ -6,6 +6,8 @@ import argparse
 import json
 import shutil
 import textwrap
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from robot_formation.cli.parser import Subparsers
@@ -19,13 +21,13 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser(
         "list",
-        help="list tracks, scenarios, paths, surfaces, predictors and robots",
+        help="list tracks, scenarios, paths, surfaces, predictors, sensors and robots",
         description="List what can be named in other verbs.",
     )
     parser.add_argument(
         "what",
         nargs="?",
-        choices=("tracks", "scenarios", "paths", "surfaces", "predictors", "robots"),
+        choices=("tracks", "scenarios", "paths", "surfaces", "predictors", "sensors", "robots"),
         help="only these",
     )
     parser.add_argument("--json", action="store_true", help="machine-readable, on standard output")
@@ -59,7 +61,11 @@ def collect() -> dict[str, dict[str, str]]:
     from robot_formation.experiment import scenario
     from robot_formation.koopman.predictors import DESCRIPTIONS
     from robot_formation.leader.paths import PATHS
+    from robot_formation.leader.paths.outside import outside_path
+    from robot_formation.plugins import load
     from robot_formation.surface import SURFACES
+    from robot_formation.surface.outside import outside_surface
+    from robot_formation.vision.sensors import SENSORS
 
     tracks = {}
     for name in scenario.track_names():
@@ -73,9 +79,11 @@ def collect() -> dict[str, dict[str, str]]:
     return {
         "tracks": tracks,
         "scenarios": {name: _formation(scenario.load(path)) for name, path in scenario.formations().items()},
-        "paths": {name: f"{_first_line(kind)} {_parameters(kind)}".strip() for name, kind in PATHS.items()},
-        "surfaces": {name: _first_line(kind) for name, kind in SURFACES.items()},
-        "predictors": DESCRIPTIONS,
+        "paths": {name: _path(kind) for name, kind in PATHS.items()} | _outside("path", outside_path, _path),
+        "surfaces": {name: _first_line(kind) for name, kind in SURFACES.items()}
+        | _outside("surface", outside_surface, _first_line),
+        "predictors": DESCRIPTIONS | _outside("predictor", partial(load, "predictor"), _first_line),
+        "sensors": SENSORS | _outside("sensor", partial(load, "sensor"), _first_line),
         "robots": {
             "leader": "drives the track, carries the tri-colour marker",
             "follower_1": "keeps 32 cm to the right of the leader; --set followers=N adds follower_2 .. follower_N",
@@ -92,6 +100,23 @@ def _formation(scenario: Scenario) -> str:
     )
 
 
+def _outside(kind: str, find: Callable[[str], type], describe: Callable[[type], str]) -> dict[str, str]:
+    """Describe what other packages add, and where each comes from; what can't be used says why."""
+    from robot_formation.plugins import PluginError, installed
+
+    found = {}
+    for name, plugin in installed(kind).items():
+        try:
+            found[name] = f"{describe(find(name))} [package {plugin.package}, {plugin.value}]".strip()
+        except PluginError as error:
+            found[name] = f"can't be used: {error}"
+    return found
+
+
+def _path(kind: type) -> str:
+    return f"{_first_line(kind)} {_parameters(kind)}".strip()
+
+
 def _parameters(kind: type) -> str:
     """List a path's parameters with their defaults; those that follow from elsewhere with the place.
 
@@ -106,4 +131,4 @@ def _parameters(kind: type) -> str:
 
 
 def _first_line(thing: Any) -> str:
-    return (thing.__doc__ or "").strip().splitlines()[0]
+    return next(iter((thing.__doc__ or "").strip().splitlines()), "")

@@ -132,12 +132,14 @@ def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[Predictor
         FormationError: naming what is misspelt, out of range or of another node.
     """
     from robot_formation.experiment.scenario import Setup, build, override
-    from robot_formation.koopman.predictors import NAMES
-    from robot_formation.parameters import suggestion
+    from robot_formation.koopman.predictors import NAMES, check_predictor_name
+    from robot_formation.parameters import ParameterError
 
     for name in chosen:
-        if name not in NAMES:
-            raise FormationError(f"--predictors: no predictor '{name}'{suggestion(name, NAMES)}")
+        try:
+            check_predictor_name(name)
+        except ParameterError as error:
+            raise FormationError(f"--predictors: {error}") from None
     scenario = override(build(Setup(), {}), settings)
     for setting in settings:
         if not setting.startswith("predictor."):

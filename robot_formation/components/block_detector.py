@@ -20,6 +20,7 @@ from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, Picture, scaled
+from robot_formation.vision.sensors import is_outside_sensor, outside_sensor
 
 _RATE_FRAMES = 31
 _WHITE = (255, 255, 255)
@@ -58,7 +59,7 @@ class BlockDetectorComponent(Component):
             FormationError: if that file, or the other sensor, can't be used; nothing is changed then.
         """
         old, detector = self._parameters, self._detector
-        if parameters.sensor is not old.sensor:
+        if parameters.sensor != old.sensor:
             self._detector = _detector(parameters)
         elif isinstance(detector, TagDetector):
             detector.configure(parameters.tags, parameters)
@@ -119,7 +120,9 @@ class BlockDetectorComponent(Component):
 
 
 def _detector(parameters: BlockDetectorNodeParameters) -> BlockSensor:
-    if parameters.sensor is MarkerKind.TAGS:
+    if is_outside_sensor(parameters.sensor):
+        return outside_sensor(parameters.sensor, parameters)
+    if parameters.sensor == MarkerKind.TAGS:
         return TagDetector(parameters.tags, parameters)
     return BlockDetector(parameters.load(), parameters)
 

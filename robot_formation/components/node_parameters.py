@@ -16,6 +16,7 @@ from robot_formation.vision.marker import MarkerKind
 from robot_formation.vision.overhead.dot_tracking import OverheadTrackingParameters
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.signatures import Signature, load_signatures
+from robot_formation.vision.sensors import SENSORS, is_outside_sensor
 from robot_formation.world.checks import check_setup
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.start import RobotStart
@@ -106,9 +107,12 @@ class OverheadTrackerNodeParameters(OverheadTrackingParameters):
 class BlockDetectorNodeParameters(DetectorParameters):
     """The camera's own parameters, where its taught signatures are stored, and the search for tags instead."""
 
-    sensor: MarkerKind = parameter(
-        MarkerKind.COLOURS,
-        "What is looked for; colours: blocks of the taught colours; tags: the ArUco tags of a marker of that kind",
+    sensor: str = parameter(
+        MarkerKind.COLOURS.value,
+        "What is looked for; colours: blocks of the taught colours; tags: the ArUco tags of a marker of that kind; "
+        "or a sensor of another package, or 'module:Class'",
+        choices=tuple(SENSORS),
+        also=is_outside_sensor,
     )
 
     signatures_file: str = parameter(

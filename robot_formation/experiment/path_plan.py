@@ -11,7 +11,7 @@ from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.geometry.se2 import Motion
 from robot_formation.geometry.slots import Slots, leader_places
 from robot_formation.leader.leader_motion import LeaderParameters
-from robot_formation.leader.paths import PATHS, LeaderPath
+from robot_formation.leader.paths import LeaderPath
 from robot_formation.leader.rigid_formation import (
     Formation,
     Track,
@@ -84,7 +84,7 @@ def path_start(
 
     None too if path or plate can't be made, which `Scenario.check` tells.
     """
-    if leader.path == STRAIGHT or leader.path not in PATHS:
+    if leader.path == STRAIGHT:
         return None
     try:
         plate_m = plate_size(world.surface, world.surface_parameters)

@@ -39,7 +39,7 @@ from robot_formation.experiment.path_plan import (
 from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.follower.fine_tuning import AlignmentModeName
 from robot_formation.geometry.slots import Slots, leader_places
-from robot_formation.koopman.predictors import PredictorParameters
+from robot_formation.koopman.predictors import Predictor, PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.parameters import (
     LENGTH_PAIRS,
@@ -55,10 +55,11 @@ from robot_formation.parameters import (
 )
 from robot_formation.paths import config_dir
 from robot_formation.schedule.schedules import Schedule, Spacing, check_spacing
-from robot_formation.surface import SURFACES, plate_size
+from robot_formation.surface import check_surface_name, plate_size
 from robot_formation.surface.base import PLATE_SIZE_M
 from robot_formation.system.yaml_files import YamlError, parse_yaml
 from robot_formation.vision.marker import MarkerKind
+from robot_formation.vision.sensors import find_sensor, is_outside_sensor
 
 P = TypeVar("P")
 Settings = Mapping[str, Mapping[str, object]]
@@ -236,6 +237,8 @@ class Scenario:
         if self.leader.path != STRAIGHT:
             self.check_path()  # says more than that a start that was chosen for it is off the plate
         self.world.check()
+        Predictor(self.predictor)  # one from outside the package is imported and made
+        find_sensor(self.block_detector.sensor)
         check_curves(self.drive, self.world, self.robots)
         check_camera(self.fine_tuner, self.world)
         if self.leader.path == STRAIGHT:
@@ -416,7 +419,7 @@ def load(path: Path) -> Scenario:
 
 def _checked(kind: str, section: Mapping[str, object], *, where: str) -> dict[str, object]:
     for name in section:
-        if name in FOLLOWS_FROM_SETUP.get(kind, {}):
+        if name in FOLLOWS_FROM_SETUP.get(kind, {}) and not (name == "sensor" and is_outside_sensor(section[name])):
             raise ParameterError(
                 f"{where}: '{name}' follows from the scenario; set {FOLLOWS_FROM_SETUP[kind][name]} instead"
             )
@@ -499,7 +502,6 @@ def with_values(scenario: Scenario, values: Sequence[tuple[str, object]], *, sou
 
 def with_surface(scenario: Scenario, surface: str) -> Scenario:
     """Return the scenario on another surface with that surface's own defaults."""
-    if surface not in SURFACES:
-        raise ParameterError(f"no surface '{surface}'{suggestion(surface, SURFACES)}")
+    check_surface_name(surface)
     scenario = with_value(scenario, "world.surface", surface)
     return with_value(scenario, "world.surface_parameters", [])

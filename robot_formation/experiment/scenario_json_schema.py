@@ -62,10 +62,10 @@ def _property(spec: Spec) -> dict[str, object]:
 
 def _limits(spec: Spec) -> dict[str, object]:
     limits: dict[str, object] = {}
-    if spec.choices:
+    if spec.choices and not spec.also:
         limits["enum"] = list(spec.choices)
-    if spec.known:
-        limits["examples"] = list(spec.known)
+    if examples := spec.known or (spec.choices if spec.also else ()):
+        limits["examples"] = list(examples)
     if spec.low is not None:
         limits["minimum"] = spec.low
     if spec.high is not None:

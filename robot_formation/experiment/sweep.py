@@ -24,11 +24,11 @@ from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.noise_floor import IDEAL, IdealRun
 from robot_formation.experiment.path_plan import STRAIGHT
 from robot_formation.json_values import JsonObject
-from robot_formation.koopman.predictors import NAMES
-from robot_formation.leader.paths import PATHS, Teleop
+from robot_formation.koopman.predictors import check_predictor_name
+from robot_formation.leader.paths import Teleop, check_path_name
 from robot_formation.names import Message
 from robot_formation.parameters import ParameterError, suggestion
-from robot_formation.surface import SURFACES
+from robot_formation.surface import check_surface_name
 
 # The comparison's common ground unless --set says otherwise: the paper's fine-tuner, pictures only when waited for.
 CONDITIONS = ("fine_tuner.mode=paper", "world.camera.mode=on_demand", "world.overhead.enabled=false")
@@ -104,17 +104,16 @@ class Plan:
         Raises:
             FormationError: naming what is misspelt or out of range.
         """
-        for kind, chosen, known in (
-            ("track", self.tracks, scenarios.track_names()),
-            ("surface", self.surfaces, list(SURFACES)),
-            ("predictor", self.predictors, [*NAMES, *IDEAL]),
-            ("path", self.paths, [name for name in PATHS if name != Teleop.name]),
+        for kind, chosen, check in (
+            ("track", self.tracks, _check_track),
+            ("surface", self.surfaces, check_surface_name),
+            ("predictor", self.predictors, _check_predictor),
+            ("path", self.paths, _check_path),
         ):
             if not chosen:
                 raise SweepError(f"no {kind} is given")
             for name in chosen:
-                if name not in known:
-                    raise SweepError(f"no {kind} '{name}'{suggestion(name, known)}")
+                check(name)
             if len(set(chosen)) != len(chosen):
                 raise SweepError(f"a {kind} is given twice")
         if not self.seeds:
@@ -160,6 +159,22 @@ class Plan:
                     for surface in self.surfaces:
                         for predictor in self.predictors:
                             yield Task(track, surface, predictor, seed, path)
+
+
+def _check_track(name: str) -> None:
+    if name not in scenarios.track_names():
+        raise SweepError(f"no track '{name}'{suggestion(name, scenarios.track_names())}")
+
+
+def _check_predictor(name: str) -> None:
+    if name not in IDEAL:
+        check_predictor_name(name)
+
+
+def _check_path(name: str) -> None:
+    if name == Teleop.name:
+        raise SweepError(f"path '{name}' is driven by a person; a sweep takes others")
+    check_path_name(name)
 
 
 def build(task: Task, settings: Sequence[str]) -> scenarios.Scenario:

@@ -1,7 +1,8 @@
 """The ground: one file per surface, found by name.
 
 A new surface is a frozen dataclass in a file of its own whose fields are made with `parameter`, with the members of
-`Surface`, and one more entry in `SURFACES`. The conformance test runs over all entries.
+`Surface`, and one more entry in `SURFACES`. The conformance test runs over all entries. One from another package needs
+no entry here (`outside.py`).
 """
 
 from __future__ import annotations
@@ -11,14 +12,16 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from robot_formation import plugins
 from robot_formation.json_values import Json
-from robot_formation.parameters import ParameterError, check, from_mapping, read_texts, specs, suggestion
+from robot_formation.parameters import check, from_mapping, read_texts, specs
 from robot_formation.surface.base import PLATE_SIZE_M, GradientNormal, Surface
 from robot_formation.surface.bowl import Bowl
 from robot_formation.surface.elliptic_bowl import EllipticBowl
 from robot_formation.surface.gaussian_bump import GaussianBump
 from robot_formation.surface.heightmap import Heightmap
 from robot_formation.surface.inclined_plane import InclinedPlane
+from robot_formation.surface.outside import outside_surface
 from robot_formation.surface.plane import Plane
 from robot_formation.surface.ripple import Ripple
 from robot_formation.surface.saddle import Saddle
@@ -36,6 +39,7 @@ __all__ = [
     "Ripple",
     "Saddle",
     "Surface",
+    "check_surface_name",
     "make_surface",
     "plate_size",
     "surface_from_texts",
@@ -79,12 +83,24 @@ def plate_size(name: str, texts: Sequence[str] = ()) -> float:
     """
     kind = _kind(name)
     values = read_texts(kind, texts, where=f"surface '{name}'", example="size_m=2.0")
-    spec = specs(kind)["size_m"]
+    spec = specs(kind).get("size_m")
+    if spec is None:  # of a class from outside that has no parameters
+        return float(make_surface(name).size_m)
     return float(typing.cast(float, check(spec, values.get("size_m", spec.default), where=f"surface '{name}'")))
+
+
+def check_surface_name(name: str) -> None:
+    """Check a surface's name; a class from outside the package is not imported for it.
+
+    Raises:
+        PluginError: with the nearest known name.
+    """
+    plugins.check_name("surface", name, SURFACES)
 
 
 def _kind(name: str) -> type[Any]:
     kind = SURFACES.get(name)
-    if kind is None:
-        raise ParameterError(f"no surface '{name}'{suggestion(name, SURFACES)}")
-    return kind
+    if kind is not None:
+        return kind
+    check_surface_name(name)
+    return outside_surface(name)

@@ -83,7 +83,7 @@ class RecordedScene:
         self.start_ns = min(int(poses.stamps_ns[0]) for poses in self._poses.values())
         self.end_ns = max(self.start_ns, round(self.record.simulated_s * 1e9))
         # Read once: the record parses the run's details anew each time.
-        self._distance_m, self._delayed = self.record.formation_distance_m, self.record.delayed
+        self._slot, self._delayed = self.record.place(self.follower), self.record.delayed
         self._ends_ns = [displacement.stamp_ns for displacement in self._record.displacements]
         self.timesteps = max(self.record.timesteps_planned or 0, len(self._ends_ns), len(self.record.leader_moved), 1)
         self._moves = [self._corrections_of(t) for t in range(1, len(self._ends_ns) + 2)]
@@ -117,11 +117,11 @@ class RecordedScene:
 
     def place(self, stamp_ns: int) -> Motion:
         """Return where in the world the follower's place in formation is."""
-        return self.beside(stamp_ns).then(Motion.from_uv(self._distance_m, 0.0))
+        return self.beside(stamp_ns).then(self._slot)
 
     def off_place_uv_m(self, pose: Motion, stamp_ns: int) -> tuple[float, float]:
         """Return how far a pose is from the follower's place: (u, v) in its neighbour's frame, metres."""
-        return formation_error_uv_m(pose, self.beside(stamp_ns), self._distance_m)
+        return formation_error_uv_m(pose, self.beside(stamp_ns), self._slot)
 
     def forecast(self, stamp_ns: int) -> PlaceForecast | None:
         """Return where the follower is expected to end the timestep; None where nothing is forecast."""

@@ -12,7 +12,7 @@ from repository import PACKAGE
 
 # From the bottom to the top, in a strict order: a part imports those before it only.
 LAYERS = [
-    ("errors", "exit_codes", "json_values", "names", "parameters", "paths", ""),
+    ("errors", "exit_codes", "json_values", "names", "parameters", "paths", "plugins", ""),
     *(
         (room,)
         for room in (
@@ -30,6 +30,7 @@ LAYERS = [
     ),
     *((room,) for room in ("drive", "leader", "alignment", "follower", "analysis")),
     *((room,) for room in ("conversions", "components")),
+    ("testing",),
     *((room,) for room in ("viewing", "calibration", "experiment", "nodes", "launching", "cli")),
 ]
 LEVEL = {area: level for level, areas in enumerate(LAYERS) for area in areas}

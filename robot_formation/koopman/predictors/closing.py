@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.predictors.models import NU, Diagnostics, Matrix, TrendFilter, Vector, array, covariance
+from robot_formation.koopman.predictors.outside import OutsideModel
 from robot_formation.koopman.predictors.parameters import ClosingParameters
 from robot_formation.koopman.predictors.spatial import Spatial, after, rotated
 
@@ -217,7 +218,7 @@ class ActuationBias:
 class Closing:
     """A model of w, with the residual closed and the actuation bias learned."""
 
-    def __init__(self, parameters: ClosingParameters, model: Spatial) -> None:
+    def __init__(self, parameters: ClosingParameters, model: Spatial | OutsideModel) -> None:
         """Wrap a model in residual feedback."""
         self._model = model
         self._filter = ClosedResidual(parameters)

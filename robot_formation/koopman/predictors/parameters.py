@@ -4,12 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from robot_formation import plugins
 from robot_formation.parameters import ParameterError, parameter
 
 CLOSABLE = ("previous", "ewma", "kalman_trend", "measured", "edmd")
 """Models that may run with residual closing and bias learning, as NAME+close."""
+CLOSE = "+close"
 TREND_CLOSE = "trend+close"
-NAMES = (*CLOSABLE, "literal", "formation", *(f"{name}+close" for name in CLOSABLE), TREND_CLOSE)
+NAMES = (*CLOSABLE, "literal", "formation", *(f"{name}{CLOSE}" for name in CLOSABLE), TREND_CLOSE)
+
+
+def is_outside_predictor(name: str) -> bool:
+    """Whether a name may be that of a predictor from outside the package; its class is not imported for it."""
+    return plugins.may_be(name.removesuffix(CLOSE), "predictor")
+
+
+def check_predictor_name(name: str) -> None:
+    """Check a predictor's name; a class from outside is not imported for it.
+
+    Raises:
+        PluginError: with the nearest known name.
+    """
+    if name not in NAMES and not is_outside_predictor(name):
+        raise plugins.unknown("predictor", name, NAMES)
 
 
 @dataclass(frozen=True)
@@ -208,7 +225,12 @@ class FormationParameters:
 class PredictorParameters:
     """Which predictor runs, and the parameters of all."""
 
-    name: str = parameter("formation", "Predictor", choices=NAMES)
+    name: str = parameter(
+        "formation",
+        "Predictor; also one of another package, or 'module:Class', and these with '+close'",
+        choices=NAMES,
+        also=is_outside_predictor,
+    )
     forgetting: float = parameter(
         1.0, "Weight of a pair relative to the next newer one ('measured'); 1 forgets nothing", low=0.01, high=1.0
     )

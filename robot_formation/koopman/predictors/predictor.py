@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robot_formation import plugins
 from robot_formation.errors import FormationError
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.koopman.linear_algebra import KoopmanError
@@ -32,13 +33,12 @@ from robot_formation.koopman.predictors.models import (
     optional,
     vector,
 )
-from robot_formation.koopman.predictors.parameters import CLOSABLE, NAMES, TREND_CLOSE, PredictorParameters
+from robot_formation.koopman.predictors.outside import OutsideModel
+from robot_formation.koopman.predictors.parameters import CLOSABLE, CLOSE, TREND_CLOSE, PredictorParameters
 from robot_formation.koopman.predictors.spatial import Spatial, after, between, ways
-from robot_formation.parameters import suggestion
 
 # Nothing moves or is measured so finely: what is less is rounding, and dividing by it makes no sense.
 _FINEST_M = 1e-9
-CLOSE = "+close"
 _FORMAT = 2  # of states; 1 knew no turns and had no number
 
 MODELS: dict[str, Callable[[PredictorParameters], Model]] = {
@@ -107,14 +107,12 @@ class Predictor:
     def __init__(self, parameters: PredictorParameters) -> None:
         self.parameters = parameters
         name = parameters.name
-        if name not in NAMES:
-            raise PredictionError(f"no predictor '{name}'{suggestion(name, NAMES)}")
         inner = name.removesuffix(CLOSE)
         self._closing: Closing | MixedExperts | None = None
         if name in EXPERTS:
             self._closing = MixedExperts(parameters, EXPERTS[name])
         else:
-            self._model = Spatial(MODELS[inner](parameters), TURN_MODELS.get(inner, Previous)(parameters, 1))
+            self._model = _model(inner, parameters)
             if name.endswith(CLOSE):
                 self._closing = Closing(parameters.closing, self._model)
         self._weight = parameters.sigma_weight
@@ -297,3 +295,14 @@ class Predictor:
         """Return vectors (..., 3) within the bounds, NaN as zero."""
         found = np.clip(mean, -self._bounds, self._bounds)
         return np.where(np.isnan(found), 0.0, found)
+
+
+def _model(name: str, parameters: PredictorParameters) -> Spatial | OutsideModel:
+    """Make the model of this name.
+
+    Raises:
+        PluginError: if it is of another package and can't be used.
+    """
+    if name not in MODELS:
+        return OutsideModel(name, plugins.load("predictor", name))
+    return Spatial(MODELS[name](parameters), TURN_MODELS.get(name, Previous)(parameters, 1))

@@ -1,7 +1,8 @@
 """The leader's paths: one file per family, found by name.
 
 A new path is a frozen dataclass in a file of its own, derived from `PathKind`, whose fields are made with `parameter`,
-and one more entry in `PATHS`. The conformance test runs over all entries.
+and one more entry in `PATHS`. The conformance test runs over all entries. One from another package needs no entry here
+(`outside.py`).
 """
 
 from __future__ import annotations
@@ -9,12 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+from robot_formation import plugins
 from robot_formation.json_values import Json
 from robot_formation.leader.paths.arc import Arc
 from robot_formation.leader.paths.base import Given, LeaderPath, PathKind, Room, poses
 from robot_formation.leader.paths.circle import Circle
 from robot_formation.leader.paths.clothoid import Clothoid
 from robot_formation.leader.paths.figures import Lemniscate, Lissajous
+from robot_formation.leader.paths.outside import outside_path
 from robot_formation.leader.paths.random_walk import RandomWalk
 from robot_formation.leader.paths.stadium import Stadium
 from robot_formation.leader.paths.straight import Straight
@@ -24,7 +27,18 @@ from robot_formation.leader.paths.waves import Pulse, Slalom
 from robot_formation.leader.paths.waypoints import Waypoints
 from robot_formation.parameters import ParameterError, from_mapping, read_texts, specs, suggestion
 
-__all__ = ["PATHS", "Given", "LeaderPath", "PathKind", "Room", "Teleop", "make_path", "path_kind", "poses"]
+__all__ = [
+    "PATHS",
+    "Given",
+    "LeaderPath",
+    "PathKind",
+    "Room",
+    "Teleop",
+    "check_path_name",
+    "make_path",
+    "path_kind",
+    "poses",
+]
 
 _KINDS: tuple[type[PathKind], ...] = (
     *(Straight, Circle, Arc, Slalom, Pulse, Lemniscate, Lissajous, Stadium, Clothoid),
@@ -38,6 +52,15 @@ PATHS: Mapping[str, type[PathKind]] = MappingProxyType({kind.name: kind for kind
 _NOTHING = Given()
 
 
+def check_path_name(name: str) -> None:
+    """Check a path's name; a class from outside the package is not imported for it.
+
+    Raises:
+        PluginError: with the nearest known name.
+    """
+    plugins.check_name("path", name, PATHS)
+
+
 def path_kind(name: str) -> type[PathKind]:
     """Return the family of this name.
 
@@ -45,9 +68,10 @@ def path_kind(name: str) -> type[PathKind]:
         ParameterError: if there is none, with the nearest known one.
     """
     kind = PATHS.get(name)
-    if kind is None:
-        raise ParameterError(f"no path '{name}'{suggestion(name, PATHS)}")
-    return kind
+    if kind is not None:
+        return kind
+    check_path_name(name)
+    return outside_path(name)
 
 
 def make_path(name: str, texts: Sequence[str] = (), given: Given = _NOTHING) -> LeaderPath:

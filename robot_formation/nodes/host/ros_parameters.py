@@ -213,7 +213,8 @@ def _descriptor(spec: Spec, fixed: str) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(description=spec.description + unit, read_only=bool(fixed))
     constraints = [f"read-only: {fixed}"] if fixed else []
     if spec.choices:
-        constraints.append("one of: " + ", ".join(map(str, spec.choices)))
+        also = ", or one from outside the package" if spec.also else ""
+        constraints.append("one of: " + ", ".join(map(str, spec.choices)) + also)
     if spec.known:
         constraints.append("known: " + ", ".join(spec.known))
     descriptor.additional_constraints = "; ".join(constraints)

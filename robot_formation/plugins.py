@@ -1,0 +1,167 @@
+"""Classes from outside the package, found by name: entry points of installed packages, and `module:Class`.
+
+A package names its classes in the entry-point groups of `GROUPS`; a class of the user's own needs no packaging, if its
+module can be imported or lies in the working directory. Nothing is imported before a name is asked for.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import importlib.metadata
+import os
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import Any
+
+from robot_formation.parameters import ParameterError, suggestion
+
+GROUPS: Mapping[str, str] = MappingProxyType(
+    {kind: f"robot_formation.{kind}s" for kind in ("predictor", "surface", "path", "sensor")}
+)
+"""Entry-point group of each kind of class that can be added."""
+
+_CLASS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
+
+
+class PluginError(ParameterError):
+    """A class from outside can't be found or used; the text says which, where it is from, and why."""
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """An entry point: the class's name here, where it is ('module:Class'), and the package that it came with."""
+
+    name: str
+    value: str
+    package: str
+
+
+@cache
+def installed(kind: str) -> Mapping[str, Plugin]:
+    """List a kind's entry points by name; of several with one name the first. Nothing is imported.
+
+    Args:
+        kind: a key of `GROUPS`.
+    """
+    found: dict[str, Plugin] = {}
+    for entry in importlib.metadata.entry_points(group=GROUPS[kind]):
+        package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
+        found.setdefault(entry.name, Plugin(entry.name, entry.value, package))
+    return MappingProxyType(found)
+
+
+def may_be(name: str, kind: str) -> bool:
+    """Whether a name is of the form 'module:Class', or an entry point's. Imports nothing."""
+    return _CLASS.fullmatch(name) is not None or name in installed(kind)
+
+
+def unknown(kind: str, name: str, own: Iterable[str] = ()) -> PluginError:
+    """Make the error of a name that is neither one of the package's own nor one from outside."""
+    return PluginError(f"no {kind} '{name}'{suggestion(name, [*own, *installed(kind)])}")
+
+
+def check_name(kind: str, name: str, own: Iterable[str]) -> None:
+    """Check that a name may be used: one of the package's own, an entry point's, or 'module:Class'. Imports nothing.
+
+    Raises:
+        PluginError: with the nearest known name.
+    """
+    if name not in own and not may_be(name, kind):
+        raise unknown(kind, name, own)
+
+
+@cache
+def load(kind: str, name: str) -> type:
+    """Import the class of this name from outside the package.
+
+    Args:
+        kind: a key of `GROUPS`.
+        name: an entry point's, or 'module:Class'.
+
+    Raises:
+        PluginError: if there is none, or its module or class can't be imported.
+    """
+    if not may_be(name, kind):
+        raise unknown(kind, name)
+    plugin = installed(kind).get(name)
+    value, origin = (plugin.value, f" (package {plugin.package})") if plugin else (name, "")
+    subject = f"{kind} '{name}'{origin}"
+    module, _, attribute = value.partition(":")
+    try:
+        with _working_directory():
+            found = getattr(importlib.import_module(module), attribute.strip())
+    except ModuleNotFoundError as error:
+        hint = "" if plugin else "; modules are looked for among the installed ones and in the working directory"
+        raise PluginError(f"{subject}: no module '{error.name}'{hint}") from error
+    except AttributeError:
+        raise PluginError(f"{subject}: module '{module}' has no '{attribute}'") from None
+    except Exception as error:  # whatever the module does when it is imported
+        raise PluginError(f"{subject}: can't be imported: {_told(error)}") from error
+    if not isinstance(found, type):
+        raise PluginError(f"{subject}: '{value}' is no class")
+    return found
+
+
+def completed(kind: str, name: str, found: type, *, needs: str, base: type, members: Mapping[str, object]) -> type[Any]:
+    """Return a class from outside with the members of a base that it leaves out, as a dataclass.
+
+    It is frozen and its fields are its parameters; a class with a constructor of its own has none.
+
+    Args:
+        kind: a key of `GROUPS`.
+        name: of the class here.
+        found: the class.
+        needs: the method that the class must have.
+        base: has defaults for everything else.
+        members: that go before the class's own.
+
+    Raises:
+        PluginError: if it can't be made without arguments, or lacks the method.
+    """
+    if not callable(getattr(found, needs, None)):
+        raise PluginError(f"{kind} '{name}': it has no method '{needs}'; see docs/how-to/extend.md")
+    parts = (found,) if issubclass(found, base) else (found, base)
+    own = {"name": name, "__doc__": found.__doc__ or f"A {kind} from outside the package.", **members}
+    try:
+        makes_itself = has_constructor(found)
+        options = {"init": not makes_itself, "frozen": not makes_itself, "eq": not makes_itself}
+        made: type[Any] = dataclasses.dataclass(**options)(type(found.__name__, parts, own))
+        made()
+    except Exception as error:  # whatever a class of somebody else's raises
+        raise failed(kind, name, "making one without arguments", error) from error
+    return made
+
+
+def has_constructor(found: type) -> bool:
+    """Whether a class from outside has a constructor of its own, other than a dataclass's."""
+    return not dataclasses.is_dataclass(found) and found.__init__ is not object.__init__  # type: ignore[misc]
+
+
+def failed(kind: str, name: str, what: str, error: Exception) -> PluginError:
+    """Make the error of a class from outside that failed at something, in one line."""
+    return PluginError(f"{kind} '{name}': {what} failed: {_told(error)}")
+
+
+def _told(error: Exception) -> str:
+    lines = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__
+
+
+@contextmanager
+def _working_directory() -> Iterator[None]:
+    """Let modules in the working directory be found, after all others; console scripts don't look there."""
+    folder = os.getcwd()
+    if folder in sys.path or "" in sys.path:
+        yield
+        return
+    sys.path.append(folder)
+    try:
+        yield
+    finally:
+        sys.path.remove(folder)

@@ -1,0 +1,110 @@
+"""What turns pictures into blocks, found by name: of the package, or a class from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, cast
+
+from numpy.typing import ArrayLike
+
+from robot_formation import plugins
+from robot_formation.vision.aruco_detector import BlockSensor
+from robot_formation.vision.marker import MarkerKind
+from robot_formation.vision.pixy2.block import Block
+from robot_formation.vision.pixy2.block_tracking import Tracker, limited
+from robot_formation.vision.pixy2.boxes import Box
+from robot_formation.vision.pixy2.detector import ALL_SIGNATURES
+from robot_formation.vision.pixy2.parameters import DetectorParameters
+from robot_formation.vision.pixy2.picture import checked
+
+KIND = "sensor"
+SENSORS = {
+    MarkerKind.COLOURS.value: "blocks of taught colours, as a Pixy2 finds them",
+    MarkerKind.TAGS.value: "the ArUco tags of a marker of that kind",
+}
+"""What each of the package's own is, in a line."""
+
+
+class OutsideSensor:
+    """A sensor made of a class from outside, which needs one method.
+
+    `detect(picture)` is shown an RGB picture, uint8 (208, 316, 3), and returns its blocks, each as five numbers:
+    signature (1, 2, 3: Target, Front and Rear face), column and row of the centre, width and height, in pixels. They
+    are tracked as the Pixy2 does. A class with `process(picture, time_us)` and `reset()` is taken as it is
+    (`BlockSensor`).
+    """
+
+    def __init__(self, name: str, made: Any, tracking: DetectorParameters) -> None:
+        """Take an object of such a class; `name` is for messages, `tracking` for its filtering of blocks."""
+        self._name = name
+        self._made = made
+        self._tracker = Tracker(tracking.block_filtering, tracking.max_tracking_velocity)
+
+    def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
+        """See `BlockSensor`.
+
+        Raises:
+            PluginError: if the class fails, or returns no blocks.
+        """
+        try:
+            boxes = _boxes(self._made.detect(checked(picture)))
+        except Exception as error:  # whatever a class of somebody else's raises
+            raise plugins.failed(KIND, self._name, "detect", error) from error
+        reported = self._tracker.step(boxes, time_us)
+        return limited(reported, ALL_SIGNATURES, len(reported))
+
+    def reset(self) -> None:
+        """See `BlockSensor`."""
+        self._tracker.reset()
+
+
+def is_outside_sensor(name: object) -> bool:
+    """Whether a name may be that of a sensor from outside the package; its class is not imported for it."""
+    return isinstance(name, str) and plugins.may_be(name, KIND)
+
+
+def find_sensor(name: str) -> None:
+    """Check that a sensor's class is there and can be made.
+
+    Raises:
+        PluginError: if not.
+    """
+    if name not in SENSORS:
+        _make(name, plugins.load(KIND, name))
+
+
+def outside_sensor(name: str, tracking: DetectorParameters) -> BlockSensor:
+    """Make a sensor of a class from outside the package.
+
+    Raises:
+        PluginError: if it can't be imported or made.
+    """
+    return made_sensor(name, plugins.load(KIND, name), tracking)
+
+
+def made_sensor(name: str, kind: type, tracking: DetectorParameters) -> BlockSensor:
+    """Make a sensor of a class; `name` is for messages.
+
+    Raises:
+        PluginError: if it can't be made, or lacks a method.
+    """
+    made = _make(name, kind)
+    return cast(BlockSensor, made) if callable(getattr(made, "process", None)) else OutsideSensor(name, made, tracking)
+
+
+def _make(name: str, kind: type) -> Any:
+    if not any(callable(getattr(kind, method, None)) for method in ("detect", "process")):
+        raise plugins.PluginError(f"{KIND} '{name}': it has no method 'detect'; see docs/how-to/extend.md")
+    try:
+        return kind()
+    except Exception as error:  # whatever a class of somebody else's raises
+        raise plugins.failed(KIND, name, "making one without arguments", error) from error
+
+
+def _boxes(found: Iterable[Iterable[float]]) -> list[Box]:
+    boxes = []
+    for block in found:
+        signature, x, y, width, height = (round(float(number)) for number in block)
+        left, top = x - width // 2, y - height // 2
+        boxes.append(Box(signature, left, left + width, top, top + height))
+    return boxes
