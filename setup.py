@@ -78,6 +78,8 @@ setup(
             "scipy-stubs",
             "types-PyYAML",
             "types-jsonschema",
+            # Builds the package of examples/ where setuptools is too old to do so itself.
+            "wheel",
         ],
     },
     entry_points={

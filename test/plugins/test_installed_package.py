@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -46,7 +47,7 @@ def test_its_classes_are_listed_with_where_they_are_from_and_the_broken_one_with
 ) -> None:
     found = json.loads(formation(environment, "list", "--json").stdout)
     for kind, name in (("predictors", "damped"), ("surfaces", "dunes"), ("paths", "zigzag"), ("sensors", "hsv")):
-        assert "[package own_classes 0.1.0, own_classes:" in found[kind][name]
+        assert re.search(r"\[package own.classes 0\.1\.0, own_classes:", found[kind][name])
     assert "period=4" in found["paths"]["zigzag"]
     assert found["predictors"]["wreck"].startswith("can't be used: predictor 'wreck' (package broken 1.0)")
     assert "RuntimeError: it is broken" in found["paths"]["wreck"]
