@@ -28,8 +28,8 @@ LIST_ELEMENTS: dict[object, type] = {
 }
 """Types of parameters that are lists, and of what."""
 
-PAIRS = tuple[tuple[int, int], ...]
-"""Type of parameters that are lists of pairs of whole numbers; only scenarios have such, ROS has none."""
+ROWS = tuple[tuple[int | float | str, ...], ...]
+"""Type of parameters that are lists of lists of numbers and words; only scenarios have such, ROS has none."""
 
 _LONGEST_NAME = 100
 _LISTED = 240  # characters
@@ -289,8 +289,8 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     Raises:
         ParameterError: on a wrong type, or a value outside the range or the choices.
     """
-    if spec.type == PAIRS:
-        return _check_pairs(spec, value, subject)
+    if spec.type == ROWS:
+        return _check_rows(value, subject)
     if spec.type in LIST_ELEMENTS:
         if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
             raise ParameterError(f"{subject} must be a list, not {shown(value)}")
@@ -305,14 +305,14 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     return spec.choice(checked) if spec.choice else checked
 
 
-def _check_pairs(spec: Spec, value: object, subject: str) -> object:
-    wrong = ParameterError(f"{subject} must be a list of pairs like [[12, 3]], not {shown(value)}")
-    if not isinstance(value, (list, tuple)):
-        raise wrong
-    for pair in value:
-        if not isinstance(pair, (list, tuple)) or len(pair) != 2:
-            raise wrong
-    return tuple(tuple(_check_one(spec, int, item, subject) for item in pair) for pair in value)
+def _check_rows(value: object, subject: str) -> object:
+    rows = value if isinstance(value, (list, tuple)) else [value]
+    if rows is not value or not all(isinstance(row, (list, tuple)) for row in rows):
+        raise ParameterError(f"{subject} must be a list of lists, [[...], ...], not {shown(value)}")
+    for item in (item for row in rows for item in row):
+        if isinstance(item, bool) or not isinstance(item, (int, float, str)):
+            raise ParameterError(f"{subject}: {shown(item)} is neither a number nor a name")
+    return tuple(tuple(row) for row in rows)
 
 
 def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:

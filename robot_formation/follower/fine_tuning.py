@@ -161,7 +161,9 @@ class Done:
 
 @dataclass(frozen=True)
 class Lost:
-    """The leader is lost: the run ends in good order."""
+    """The neighbour is lost, and why: the follower stands from now on."""
+
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -273,8 +275,7 @@ class FineTuner:
             return []
         self._resent += 1
         if self._resent > self._p.look.max_requests:
-            self._phase = Phase.LOST
-            return [State(AlignmentState.LOST), Warn("the camera gives no frames any more"), Lost()]
+            return self._lose("the camera gives no frames any more")
         missing = self._frames_wanted - len(self._frames)
         return [Warn(f"{missing} frames of a look are missing: asked for again"), RequestFrames(missing)]
 
@@ -389,8 +390,7 @@ class FineTuner:
 
     def _decide(self, decision: Decision) -> list[Action]:
         if decision.verdict is Verdict.LOST:
-            self._phase = Phase.LOST
-            return [State(AlignmentState.LOST), Lost()]
+            return self._lose(decision.reason)
         if decision.verdict is Verdict.LOOK:
             self._out_of_view = True
             return [State(AlignmentState.HOLD), *self._look()]
@@ -410,6 +410,10 @@ class FineTuner:
         if self.timestep == 0:
             return [*actions, *self._finish()]
         return [*actions, *self._report(self._alignment.offset())]
+
+    def _lose(self, reason: str) -> list[Action]:
+        self._phase = Phase.LOST
+        return [State(AlignmentState.LOST, reason), Lost(reason)]
 
     def _report(self, residual: UncertainMotion | None) -> list[Action]:
         self._phase = Phase.PREDICTION
