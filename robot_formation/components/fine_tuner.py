@@ -42,9 +42,11 @@ class FineTunerComponent(Component):
         super().__init__(place)
         self._schedule = parameters.schedule
         self._last = parameters.done_listeners <= 1
+        self._left = names.beacon_neighbour(place.robot)
         self._rule = StartRule(
             parameters.schedule,
             parameters.spacing,
+            first=self._left == names.LEADER,
             last=self._last,
             period_s=parameters.period_s,
             timesteps=parameters.timesteps,
@@ -52,7 +54,6 @@ class FineTunerComponent(Component):
         self._tuner = core.FineTuner(calibrated(parameters), self._rule)
         self.patience_s = parameters.look.patience_s
         self._timesteps = parameters.timesteps
-        self._left = names.beacon_neighbour(place.robot)
         listeners = done_listeners(parameters.schedule, parameters.done_listeners, first=self._left == names.LEADER)
         self._done = names.formation_done(place.robot, place.formation, listeners=listeners)
         following = ("world",) if self._last else ("fine_tuner", "world")

@@ -213,6 +213,7 @@ class FineTuner:
         self._actuation_error: Motion | None = None
         self._frames: list[Sequence[Block]] = []
         self._frames_wanted = 0
+        self._looks = 0  # in this timestep
         self._extensions = 0
         self._look_from_ns = -1
         self.timestep = 0
@@ -310,6 +311,7 @@ class FineTuner:
         self._alignment.restart(self.timestep, step)
         self._displacement = Motion()
         self._actuation_error = None
+        self._looks = 0
         if self.timestep == 0:
             return [State(AlignmentState.ALIGN), *self._look()]
         return self._go()
@@ -367,6 +369,9 @@ class FineTuner:
 
     def _look(self) -> list[Action]:
         self._phase = Phase.LOOK
+        if self._looks and self.rule.neighbour_corrects(self.timestep):
+            self._alignment.neighbour_corrects()
+        self._looks += 1
         self._frames = []
         self._frames_wanted = self._p.look.frames
         self._extensions = 0

@@ -196,6 +196,13 @@ class PoseFilter:
         for hypothesis in self.hypotheses:
             hypothesis.covariance = hypothesis.covariance + variance
 
+    def neighbour_corrects(self, sigma_m: float) -> None:
+        """Take the neighbour's position for less certain: it may have corrected its own since the last look."""
+        variance = np.zeros((SIZE, SIZE))
+        variance[X, X] = variance[Y, Y] = sigma_m**2
+        for hypothesis in self.hypotheses:
+            hypothesis.covariance = hypothesis.covariance + variance
+
     # --- moves ------------------------------------------------------------------------------------------------------
 
     def moved(self, motion: Motion) -> None:
