@@ -171,7 +171,7 @@ def _lost(values: JsonObject) -> list[tuple[str, str]]:
     lost = values["lost"]
     if lost is None:
         return []
-    when = "" if lost["seconds"] is None else f", after {lost['seconds']:.1f} s"
+    when = "" if lost["seconds"] is None else f", at {lost['seconds']:.1f} s"
     return [("neighbour lost", f"in timestep {lost['t']}{when}{': ' if lost['reason'] else ''}{lost['reason'] or ''}")]
 
 
