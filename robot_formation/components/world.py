@@ -117,7 +117,8 @@ class WorldComponent(Component):
         except FormationError as error:
             self.warn(f"{error}; the push of timestep {push.timestep} is left out")
             return
-        self._publish(RobotPose(push.robot, self._world.stamp_ns, self._world.ground_truth(push.robot), final=True))
+        state, rests = self._world.ground_truth(push.robot), push.robot not in self._moving
+        self._publish(RobotPose(push.robot, self._world.stamp_ns, state, final=rests))
 
     def _on_alignment(self, robot: str, message: Message) -> None:
         if AlignmentState.parse(message.data) is AlignmentState.LOST:

@@ -43,6 +43,7 @@ class Recording:
             raise BagError(f"{bag.path} has no topics of a follower; give the bag of 'formation run'")
         details = bag.metadata(METADATA_NAME)
         self._parameters = node_parameters(details)
+        self._own_blackouts = mapping(details, "own_blackouts")
         self.notes = _changes({**mapping(details, "versions"), "commit": details.get("git_commit", "")})
         if not self._parameters:
             self.notes.append("the bag doesn't tell the nodes' parameters: the defaults are taken")
@@ -74,6 +75,10 @@ class Recording:
             BagError: they have another type, or the bag is corrupted.
         """
         return list(self.messages(robot, topic)) if self.has(robot, topic) else []
+
+    def own_blackouts(self, robot: str) -> JsonObject:
+        """Return the fine-tuner's parameter that this follower has otherwise than `parameters` says, if it has."""
+        return {"blackouts": self._own_blackouts[robot]} if robot in self._own_blackouts else {}
 
     def parameters(self, kind: str, changes: JsonObject) -> Any:
         """Make a node's parameter object: as recorded, with some changed.

@@ -100,7 +100,12 @@ def replay_fine_tuner(recording: Recording, changes: JsonObject) -> list[FineTun
             f"a fine-tuner can't be replayed from a run by the schedule '{parameters.schedule}', whose "
             "followers wait for no neighbour's tick; replay runs by turns or wave"
         )
-    return [_Driver(recording, robot, parameters).run() for robot in recording.followers]
+    found = []
+    for robot in recording.followers:
+        own = recording.own_blackouts(robot)
+        its = recording.parameters("fine_tuner", {**own, **changes}) if own else parameters
+        found.append(_Driver(recording, robot, its).run())
+    return found
 
 
 @dataclass

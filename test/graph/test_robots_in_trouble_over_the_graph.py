@@ -50,10 +50,12 @@ def test_when_a_followers_fine_tuner_is_killed_the_others_stand_in_good_order(tm
     "settings",
     [
         ("schedule=wave", "world.camera.pan_deg=-90"),
-        ("schedule=timer", "world.camera.pan_deg=-90", "leader.timesteps=2"),
         # Two robots are pushed, one of them while all move, and one follower is blind.
-        ("schedule=together", "pushes=[[follower_1, 2, 0.03, 0.0], [follower_2, 3, 0.0, -0.03]]", "blackouts=[[follower_2, 4, 1]]"),
-        ("schedule=turns", "pushes=[[follower_1, 2, 0.03, 0.0]]", "leader.path=slalom", "leader.path_parameters=[step_m=0.03, period=8]"),
+        ("schedule=together", "leader.timesteps=3", "blackouts=[[follower_2, 3, 1]]",
+         "pushes=[[follower_1, 2, 0.03, 0.0], [follower_2, 3, 0.0, -0.03]]"),
+        # The leader's moves have two legs, and in turns the next robot's command may come before the leader's `moved`.
+        ("schedule=turns", "leader.timesteps=2", "pushes=[[follower_1, 2, 0.03, 0.0]]",
+         "leader.path=slalom", "leader.path_parameters=[step_m=0.03, period=8]"),
     ],
 )  # fmt: skip
 def test_trouble_is_the_same_over_the_graph_and_in_one_process(tmp_path: Path, settings: tuple[str, ...]) -> None:
@@ -61,5 +63,8 @@ def test_trouble_is_the_same_over_the_graph_and_in_one_process(tmp_path: Path, s
     result = launch(scenario, tmp_path / "graph")
     again = run_in_process(scenario, tmp_path / "process", {})
     assert (result.exit_code, result.reason) == (again.exit_code, again.reason)
+    if result.exit_code == exit_codes.LOST:
+        assert result.reason.startswith("follower_1 lost its beacon neighbour in timestep 0: not found again in ")
+        return
     for follower in (0, 1):
         assert displacements(tmp_path / "graph", follower) == displacements(tmp_path / "process", follower)
