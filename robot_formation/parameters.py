@@ -306,13 +306,18 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
 
 
 def _check_rows(value: object, subject: str) -> object:
-    rows = value if isinstance(value, (list, tuple)) else [value]
-    if rows is not value or not all(isinstance(row, (list, tuple)) for row in rows):
-        raise ParameterError(f"{subject} must be a list of lists, [[...], ...], not {shown(value)}")
-    for item in (item for row in rows for item in row):
-        if isinstance(item, bool) or not isinstance(item, (int, float, str)):
-            raise ParameterError(f"{subject}: {shown(item)} is neither a number nor a name")
-    return tuple(tuple(row) for row in rows)
+    wrong = ParameterError(f"{subject} must be a list of lists, [[...], ...], not {shown(value)}")
+    if not isinstance(value, (list, tuple)):
+        raise wrong
+    found = []
+    for row in value:
+        if not isinstance(row, (list, tuple)):
+            raise wrong
+        for item in row:
+            if isinstance(item, bool) or not isinstance(item, (int, float, str)):
+                raise ParameterError(f"{subject}: {shown(item)} is neither a number nor a name")
+        found.append(tuple(row))
+    return tuple(found)
 
 
 def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:
