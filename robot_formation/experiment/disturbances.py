@@ -9,6 +9,7 @@ from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.parameters import ParameterError, suggestion
 from robot_formation.world.pushes import Push, read_push
 
+_LAST_TIMESTEP = 1_000_000  # a longer list would fill the memory
 Row = Sequence[int | float | str]
 
 
@@ -27,7 +28,7 @@ def blackouts_of(rows: Sequence[Row], robots: Sequence[str], robot: str = "") ->
     for row in rows:
         own = len(row) == 3 and isinstance(row[0], str)
         numbers = [number for number in (row[1:] if own else row) if isinstance(number, int)]
-        if len(numbers) != 2 or len(row) != 2 + own:
+        if len(numbers) != 2 or len(row) != 2 + own or max(numbers) > _LAST_TIMESTEP:
             raise ParameterError(
                 f"'blackouts': {shown(list(row))} is no blackout; write [first timestep, length], "
                 "or [follower_2, first timestep, length] for one follower"
@@ -50,7 +51,7 @@ def pushes_of(rows: Sequence[Row]) -> tuple[Push, ...]:
 
 
 def _push(row: Row) -> Push:
-    if len(row) != 4 or not isinstance(row[0], str) or any(isinstance(value, str) for value in row[1:]):
+    if len(row) != 4 or not isinstance(row[0], str):
         raise ParameterError(
             f"'pushes': {shown(list(row))} is no push; write [robot, timestep, metres ahead, metres to the left], "
             "like [follower_2, 8, 0.03, 0.0]"

@@ -194,6 +194,7 @@ def test_a_replay_knows_whose_cameras_were_closed(tmp_path: Path) -> None:
         ("blackouts=[[follower_2, 3, 2.5]]", "is no blackout"),
         ("blackouts=[[3, 2], [follower_2, 4, 1]]", "'blackouts': [4, 1] overlaps another blackout"),
         ("blackouts=[[follower_2, 5, 3]]", "'blackouts' last until timestep 7, but the run has only 6"),
+        ("blackouts=[[1, 1000000000000]]", "is no blackout"),
         ("blackouts={follower_2: [3, 2]}", "blackouts"),
         ("blackouts=[[true, 2]]", "neither a number nor a name"),
         ("pushes=[[follower_4, 3, 0.0, 0.0]]", "no robot 'follower_4'"),
