@@ -172,7 +172,9 @@ def test_one_follower_may_be_blind_alone() -> None:
     plain = record("schedule=together")
     assert [d.motion for d in found.followers[0].displacements] == [d.motion for d in plain.followers[0].displacements]
     for follower in analysis.followers[1:]:
-        assert follower.timesteps[-1].formation_error_m < 0.02
+        error_m = follower.timesteps[-1].formation_error_m
+        assert error_m is not None
+        assert error_m < 0.02
 
 
 def test_a_replay_knows_whose_cameras_were_closed(tmp_path: Path) -> None:
