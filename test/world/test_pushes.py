@@ -19,7 +19,7 @@ def test_a_pushed_robot_is_displaced_in_its_own_frame_and_nothing_tells_it(surfa
     before, joints = a_world.ground_truth(ROBOT), a_world.joint_states(ROBOT)
     a_world.push(Push(ROBOT, 1, 0.03, -0.02))
     forward, left, turn = displacement(a_world, ROBOT, before)
-    assert (forward, left) == (pytest.approx(0.03), pytest.approx(-0.02))
+    assert (forward, left) == pytest.approx((0.03, -0.02))
     assert turn == pytest.approx(0.0, abs=1e-6)
     assert a_world.joint_states(ROBOT) == joints
     assert not a_world.owes
