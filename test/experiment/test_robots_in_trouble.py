@@ -153,7 +153,9 @@ def test_a_push_is_in_the_ground_truth_but_not_in_the_encoders() -> None:
     settings = ("schedule=timer", "spacing=delayed")
     plain, pushed = (record(*settings, *more).followers[1] for more in ((), (PUSH,)))
     k = PUSHED_IN - 1
-    assert pushed.displacements[k].motion == plain.displacements[k].motion
+    # Pushed while it drives it goes on over other ground, which is a matter of micrometres.
+    assert pushed.displacements[k].motion.x_m == pytest.approx(plain.displacements[k].motion.x_m, abs=0.0003)
+    assert pushed.displacements[k].motion.y_m == pytest.approx(plain.displacements[k].motion.y_m, abs=0.0003)
     left = [f.residuals[k].motion.x_m for f in (plain, pushed)]
     assert left[0] - left[1] == pytest.approx(0.03, abs=0.004)
     track, before = (record(*settings, *more).tracks["follower_2"] for more in ((PUSH,), ()))
