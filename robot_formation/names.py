@@ -97,6 +97,11 @@ def moved(robot: str) -> Topic:
     return Topic(under(robot, MOVED.name), MOVED.type, MOVED.qos)
 
 
+def alignment(robot: str) -> Topic:
+    """State of a follower's alignment."""
+    return Topic(under(robot, ALIGNMENT.name), ALIGNMENT.type, ALIGNMENT.qos)
+
+
 def right_neighbour(robot: str) -> str:
     """Return the name of the follower on a robot's right, whether there is one or not."""
     return follower(1 if robot == LEADER else int(robot.removeprefix("follower_")) + 1)

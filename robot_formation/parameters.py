@@ -28,10 +28,11 @@ LIST_ELEMENTS: dict[object, type] = {
 }
 """Types of parameters that are lists, and of what."""
 
-PAIRS = tuple[tuple[int, int], ...]
 LENGTH_PAIRS = tuple[tuple[float, float], ...]
-PAIR_ELEMENTS: dict[object, type] = {PAIRS: int, LENGTH_PAIRS: float}
-"""Types of parameters that are lists of pairs, and of what; only scenarios have such, ROS has none."""
+"""Type of parameters that are lists of pairs of lengths; only scenarios have such, ROS has none."""
+
+ROWS = tuple[tuple[int | float | str, ...], ...]
+"""Type of parameters that are lists of lists of numbers and words; only scenarios have such, ROS has none."""
 
 _LONGEST_NAME = 100
 _LISTED = 240  # characters
@@ -299,8 +300,10 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     Raises:
         ParameterError: on a wrong type, or a value outside the range or the choices.
     """
-    if spec.type in PAIR_ELEMENTS:
-        return _check_pairs(spec, PAIR_ELEMENTS[spec.type], value, subject)
+    if spec.type == LENGTH_PAIRS:
+        return _check_pairs(spec, value, subject)
+    if spec.type == ROWS:
+        return _check_rows(value, subject)
     if spec.type in LIST_ELEMENTS:
         if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
             raise ParameterError(f"{subject} must be a list, not {shown(value)}")
@@ -315,15 +318,29 @@ def check_as(spec: Spec, value: object, subject: str) -> object:
     return spec.choice(checked) if spec.choice else checked
 
 
-def _check_pairs(spec: Spec, kind: type, value: object, subject: str) -> object:
-    example = "[[12, 3]]" if kind is int else "[[0.32, -0.05]]"
-    wrong = ParameterError(f"{subject} must be a list of pairs like {example}, not {shown(value)}")
+def _check_pairs(spec: Spec, value: object, subject: str) -> object:
+    wrong = ParameterError(f"{subject} must be a list of pairs like [[0.32, -0.05]], not {shown(value)}")
     if not isinstance(value, (list, tuple)):
         raise wrong
     for pair in value:
         if not isinstance(pair, (list, tuple)) or len(pair) != 2:
             raise wrong
-    return tuple(tuple(_check_one(spec, kind, item, subject) for item in pair) for pair in value)
+    return tuple(tuple(_check_one(spec, float, item, subject) for item in pair) for pair in value)
+
+
+def _check_rows(value: object, subject: str) -> object:
+    wrong = ParameterError(f"{subject} must be a list of lists, [[...], ...], not {shown(value)}")
+    if not isinstance(value, (list, tuple)):
+        raise wrong
+    found = []
+    for row in value:
+        if not isinstance(row, (list, tuple)):
+            raise wrong
+        for item in row:
+            if isinstance(item, bool) or not isinstance(item, (int, float, str)):
+                raise ParameterError(f"{subject}: {shown(item)} is neither a number nor a name")
+        found.append(tuple(row))
+    return tuple(found)
 
 
 def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:

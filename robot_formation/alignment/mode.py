@@ -47,6 +47,9 @@ class AlignmentMode(Protocol):
                 nothing is.
         """
 
+    def neighbour_corrects(self) -> None:
+        """The neighbour may have moved since the last look: it corrects at the same time."""
+
     def turn(self, forecast_rad: float) -> float:
         """Return the turn [rad] to make with the prediction move, of which so much was forecast."""
 

@@ -195,6 +195,9 @@ class PaperMode:
         self._blocks = ()
         self._way = (left or UncertainMotion(Motion())).then(step) if step is not None else None
 
+    def neighbour_corrects(self) -> None:
+        """See `AlignmentMode`: looks are judged each for itself."""
+
     def turn(self, forecast_rad: float) -> float:
         """See `AlignmentMode`; the rule table leaves the heading alone, so that a forecast turn isn't made either."""
         return 0.0

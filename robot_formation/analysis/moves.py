@@ -103,6 +103,16 @@ def losses(follower: FollowerRecord) -> tuple[Loss, ...]:
     return tuple(found)
 
 
+def lost_at(follower: FollowerRecord) -> dict[str, object] | None:
+    """Tell in which timestep, at what simulated time (None: unknown) and why a follower gave up; None if it didn't."""
+    known = len(follower.state_stamps_ns) == len(follower.states)
+    for number, (t, text) in enumerate(_with_timestep(follower.states)):
+        if AlignmentState.parse(text) is AlignmentState.LOST:
+            seconds = follower.state_stamps_ns[number] / 1e9 if known else None
+            return {"t": t, "seconds": seconds, "reason": text.partition(": ")[2] or None}
+    return None
+
+
 def move_totals(timesteps: Sequence[Moves], movements: Sequence[int], follower: FollowerRecord) -> dict[str, object]:
     """Sum up a follower's moves and losses as the command line's JSON has them.
 
@@ -119,6 +129,7 @@ def move_totals(timesteps: Sequence[Moves], movements: Sequence[int], follower: 
         "movements_median": median(movements) if movements else None,
         "movements_max": max(movements, default=None),
         "losses": [asdict(loss) for loss in lost],
+        "lost": lost_at(follower),
         "reacquired": sum(loss.reacquired for loss in lost),
         "reacquisition_median_s": median(seconds) if seconds else None,
         "reacquisition_max_s": max(seconds, default=None),

@@ -43,7 +43,7 @@ def text_report(record: RunRecord, analysis: RunAnalysis) -> str:
             sections.append(follower.name.replace("_", " "))
         sections.append("\n".join(_table(follower)))
         sections.append("\n".join(_totals(follower)))
-    sections.append(f"outcome: {analysis.outcome}")
+    sections.append(f"outcome: {analysis.outcome}{_who_is_lost(analysis)}")
     return "\n\n".join(sections)
 
 
@@ -124,6 +124,7 @@ def _totals(follower: FollowerAnalysis) -> list[str]:
         (f"correction distance from timestep {COLLECTION_TIMESTEPS + 1}", _correction(values)),
         ("correction moves", _movements(values)),
         *_moves(values),
+        *_lost(values),
         *_losses(values),
         ("formation error", _formation_error(values)),
         ("heading error", f"RMSE {_scaled(values['heading_error_rmse_rad'], math.degrees(1.0))} deg"),
@@ -158,6 +159,20 @@ def _moves(values: JsonObject) -> list[tuple[str, str]]:
     if kinds:
         said.append(("  by kind", ", ".join(f"{kind} ({count})" for kind, count in kinds.items())))
     return said
+
+
+def _who_is_lost(analysis: RunAnalysis) -> str:
+    """Name the followers that have lost their neighbours, where there are several."""
+    lost = [f"{f.name} in timestep {f.totals['lost']['t']}" for f in analysis.followers if f.totals["lost"]]
+    return f" ({', '.join(lost)})" if lost and len(analysis.followers) > 1 else ""
+
+
+def _lost(values: JsonObject) -> list[tuple[str, str]]:
+    lost = values["lost"]
+    if lost is None:
+        return []
+    when = "" if lost["seconds"] is None else f", at {lost['seconds']:.1f} s"
+    return [("neighbour lost", f"in timestep {lost['t']}{when}{': ' if lost['reason'] else ''}{lost['reason'] or ''}")]
 
 
 def _losses(values: JsonObject) -> list[tuple[str, str]]:

@@ -202,7 +202,7 @@ class AlignmentTrial:
             self.trial.touched = True
 
     def _judge(self) -> None:
-        words = [state for state in self.trial.states if state in _OUTCOMES]
+        words = [word for state in self.trial.states if (word := state.partition(":")[0]) in _OUTCOMES]
         self.trial.outcome = words[-1] if words else "lost"
         leader = self._world.ground_truth(names.LEADER).pose
         follower = self._world.ground_truth(FOLLOWER).pose

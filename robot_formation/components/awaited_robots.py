@@ -25,6 +25,7 @@ class _Robot:
         active: whether it has not finished the timestep begun.
         moving: whether a motion that it has ordered is under way.
         looking: whether frames that it has asked for are outstanding.
+        lost: whether it has lost its neighbour, and orders nothing any more.
     """
 
     begun: int = -1
@@ -32,6 +33,7 @@ class _Robot:
     active: bool = False
     moving: bool = False
     looking: bool = False
+    lost: bool = False
 
     @property
     def busy(self) -> bool:
@@ -41,7 +43,7 @@ class _Robot:
     @property
     def awaited(self) -> bool:
         """Whether its nodes have to order something, or to say that they are done."""
-        return not self.busy and (self.active or self.allowed > self.begun)
+        return not (self.busy or self.lost) and (self.active or self.allowed > self.begun)
 
 
 class AwaitedRobots:
@@ -106,6 +108,16 @@ class AwaitedRobots:
         robot = self._robots[name]
         robot.active = robot.busy
         robot.begun += robot.busy
+
+    def give_up(self, name: str) -> None:
+        """A robot has lost its neighbour and stands from now on."""
+        self._robots[name].lost = True
+
+    @property
+    def stuck(self) -> bool:
+        """Whether nobody has anything to order any more because a robot is lost; by the clock time goes on."""
+        waiting = self._schedule in (Schedule.WAVE, Schedule.TOGETHER) and not self.any
+        return waiting and any(robot.lost for robot in self._robots.values())
 
     def finished(self, name: str, timestep: int) -> None:
         """A robot's tick: in `wave` it lets its neighbours begin the next timestep."""

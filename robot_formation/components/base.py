@@ -50,7 +50,8 @@ class Place:
 class Component:
     """Base of all components. The host calls `attach` once, then `start`, then the inputs' handlers in order.
 
-    A component that has finished sets `exit_code`; its host then ends with it. A host that reports health gives a
+    A component that has finished sets `exit_code`; its host then ends with it. One that has failed, but stays for the
+    sake of the others, sets `held_code`, with which its host ends when the run does. A host that reports health gives a
     `wall_clock` (seconds, from any origin), to measure how long work takes and for nothing else.
     """
 
@@ -63,6 +64,8 @@ class Component:
         self.place = place
         self.exit_code: int | None = None
         self.exit_reason = ""
+        self.held_code = 0
+        self.held_reason = ""
         self.stamp_ns = 0
         self.wall_clock: Callable[[], float] | None = None
         self._send: Callable[[Topic, Message], None] = _not_attached
@@ -136,6 +139,11 @@ class Component:
     def finish(self, exit_code: int, reason: str) -> None:
         """End the component's work; its host ends in good order."""
         self.exit_code, self.exit_reason = exit_code, reason
+
+    def hold(self, exit_code: int, reason: str) -> None:
+        """Go on for the sake of the others, but end with this code once the run does."""
+        self.held_code, self.held_reason = exit_code, reason
+        self.warn(reason)
 
 
 def _not_attached(topic: Topic, message: Message) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 from robot_formation import conversions, exit_codes, names
@@ -41,9 +42,11 @@ class FineTunerComponent(Component):
         super().__init__(place)
         self._schedule = parameters.schedule
         self._last = parameters.done_listeners <= 1
+        self._left = names.beacon_neighbour(place.robot)
         self._rule = StartRule(
             parameters.schedule,
             parameters.spacing,
+            first=self._left == names.LEADER,
             last=self._last,
             period_s=parameters.period_s,
             timesteps=parameters.timesteps,
@@ -51,7 +54,6 @@ class FineTunerComponent(Component):
         self._tuner = core.FineTuner(calibrated(parameters), self._rule)
         self.patience_s = parameters.look.patience_s
         self._timesteps = parameters.timesteps
-        self._left = names.beacon_neighbour(place.robot)
         listeners = done_listeners(parameters.schedule, parameters.done_listeners, first=self._left == names.LEADER)
         self._done = names.formation_done(place.robot, place.formation, listeners=listeners)
         following = ("world",) if self._last else ("fine_tuner", "world")
@@ -59,6 +61,8 @@ class FineTunerComponent(Component):
         self._told_begun, self._passed_on = 0, -1
         self._finished = -1
         self._base = place.frame(names.BASE_FRAME)
+        watching = () if self._schedule is Schedule.TURNS else ("world",)
+        self._alignment = replace(names.ALIGNMENT, listeners=watching)
         self._answers: dict[int, dict[names.Topic, Message]] = {}  # the predictor's, by stamp
         self._first_forecast_ns: int | None = None
 
@@ -97,7 +101,7 @@ class FineTunerComponent(Component):
             names.COMMANDED,
             names.DISPLACEMENT,
             names.RESIDUAL,
-            names.ALIGNMENT,
+            self._alignment,
             *ticks,
         ]
 
@@ -206,14 +210,19 @@ class FineTunerComponent(Component):
                 case core.Done(timestep):
                     self._finish(timestep)
                 case State():
-                    self._send(names.ALIGNMENT, conversions.string(action.text))
+                    self._send(self._alignment, conversions.string(action.text))
                 case core.Warn(text):
                     self.warn(text)
-                case core.Lost():
-                    self.finish(
-                        exit_codes.LOST,
-                        f"{self.place.robot} lost its beacon neighbour in timestep {self._tuner.timestep}",
-                    )
+                case core.Lost(reason):
+                    self._lose(reason)
+
+    def _lose(self, reason: str) -> None:
+        """End the run, or stand still where other robots may still have something to do."""
+        text = f"{self.place.robot} lost its beacon neighbour in timestep {self._tuner.timestep}: {reason}"
+        if self._schedule is Schedule.TURNS:  # all others stand and wait already
+            self.finish(exit_codes.LOST, text)
+        else:
+            self.hold(exit_codes.LOST, text)
 
     def _report(self, report: core.Report) -> None:
         # The predictor waits for the pair, so what it may use beside them goes first.

@@ -19,6 +19,7 @@ from robot_formation.vision.pixy2.signatures import Signature, load_signatures
 from robot_formation.vision.sensors import SENSORS, is_outside_sensor
 from robot_formation.world.checks import check_setup
 from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.pushes import Push, check_push, read_push
 from robot_formation.world.start import RobotStart
 
 
@@ -44,6 +45,11 @@ class WorldNodeParameters(WorldParameters):
     )
     timesteps: int = parameter(20, "Timesteps of the run, for schedules other than turns", low=1, high=100000)
     period_s: float = period_parameter()
+    pushes: tuple[str, ...] = parameter(
+        (),
+        "Each as 'robot timestep x_m y_m': at the end of the leader's move of the timestep the robot is displaced by "
+        "so much in its own frame, without turning its wheels",
+    )
 
     def __post_init__(self) -> None:
         """Check that every robot has a start."""
@@ -53,6 +59,12 @@ class WorldNodeParameters(WorldParameters):
             raise ParameterError(
                 "world: 'robots' must differ and have one start_x_m, start_y_m and start_heading_rad each"
             )
+        for push in self.read_pushes():
+            check_push(push, self.robots, self.timesteps)
+
+    def read_pushes(self) -> list[Push]:
+        """Read the pushes."""
+        return [read_push(text) for text in self.pushes]
 
     def starts(self) -> list[RobotStart]:
         """List the robots with their start poses."""

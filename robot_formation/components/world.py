@@ -17,11 +17,13 @@ from robot_formation.components.node_parameters import WorldNodeParameters
 from robot_formation.components.overhead_view import OverheadView
 from robot_formation.components.trail import Trail
 from robot_formation.errors import FormationError
+from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.names import Message
 from robot_formation.schedule.schedules import Schedule
 from robot_formation.surface import Surface
 from robot_formation.world.description import robot_description
 from robot_formation.world.events import Event, Frame, JointStates, LeftPlate, RobotPose
+from robot_formation.world.pushes import Push
 from robot_formation.world.world import World
 
 _MESH_CELLS = 40
@@ -31,7 +33,7 @@ class WorldComponent(Component):
     """Moves robots on `<robot>/joint_commands`, takes pictures on `<robot>/camera/request`, publishes what happens."""
 
     fixed: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("robots", "overhead.enabled", "schedule"), "it decides on topics; start another world"
+        ("robots", "overhead.enabled", "schedule", "pushes"), "it decides on topics; start another world"
     )
 
     def __init__(self, parameters: WorldNodeParameters, place: Place) -> None:
@@ -59,6 +61,9 @@ class WorldComponent(Component):
         self._overhead = OverheadView(surface, parameters, parameters.seed)
         self.stamp_ns = start_ns
         self._awaited = AwaitedRobots(parameters.schedule, parameters.robots, parameters.timesteps, parameters.period_s)
+        self._pushes = parameters.read_pushes()
+        self._leader_moves = 0
+        self._leader_between = False  # its motion has ended: the next leg of its move follows, or the move is over
         self._owe_period()
 
     def _owe_period(self) -> None:
@@ -82,8 +87,10 @@ class WorldComponent(Component):
         )
         robots = self._parameters.robots
         heard = [Input(topic(name, self.place.formation), partial(self._on_tick, name)) for name in robots if topic]
-        if self._parameters.schedule.at_once:
-            heard.append(Input(names.moved(names.LEADER), lambda message: self._awaited.idle(names.LEADER)))
+        if self._parameters.schedule.at_once or self._parameters.pushes:
+            heard.append(Input(names.moved(names.LEADER), self._on_leader_moved))
+        if self._parameters.schedule is not Schedule.TURNS:
+            heard += [Input(names.alignment(name), partial(self._on_alignment, name)) for name in self._cameras]
         return heard
 
     def _on_tick(self, robot: str, message: Message) -> None:
@@ -92,6 +99,36 @@ class WorldComponent(Component):
             self._awaited.finished(robot, timestep)
         else:
             self._awaited.begun(robot, timestep)
+        self._end_if_stuck()
+
+    def _on_leader_moved(self, message: Message) -> None:
+        self._leader_moves += 1
+        self._leader_between = False
+        for push in [push for push in self._pushes if push.timestep == self._leader_moves]:
+            self._push(push)
+        if self._parameters.schedule.at_once:
+            self._awaited.idle(names.LEADER)
+            self._end_if_stuck()
+
+    def _push(self, push: Push) -> None:
+        """Push a robot now; time stands still until then, since the leader's move has ended."""
+        try:
+            self._world.push(push)
+        except FormationError as error:
+            self.warn(f"{error}; the push of timestep {push.timestep} is left out")
+            return
+        state, rests = self._world.ground_truth(push.robot), push.robot not in self._moving
+        self._publish(RobotPose(push.robot, self._world.stamp_ns, state, final=rests))
+
+    def _on_alignment(self, robot: str, message: Message) -> None:
+        if AlignmentState.parse(message.data) is AlignmentState.LOST:
+            self._awaited.give_up(robot)
+            self._end_if_stuck()
+
+    def _end_if_stuck(self) -> None:
+        """End the run if a robot is lost and all others wait for it, or for one that does."""
+        if self._awaited.stuck and not self._world.owes:
+            self.finish(exit_codes.LOST, "the others have finished what they could and stand")
 
     def outputs(self) -> list[names.Topic]:
         """See `Component`."""
@@ -136,12 +173,18 @@ class WorldComponent(Component):
     @property
     def busy(self) -> bool:
         """See `Component`."""
-        return self._world.owes and not self._paused and not self._awaited.any
+        return self._world.owes and not self._paused and not self._waits
+
+    @property
+    def _waits(self) -> bool:
+        """Whether time stands still although it is owed: somebody has to order something or to say that it is done."""
+        return self._awaited.any or self._leader_between
 
     def work(self) -> None:
         """See `Component`: advances to the next instant that has something to publish."""
         self._tell(self._world.advance())
         self._end_period()
+        self._end_if_stuck()
 
     def _end_period(self) -> None:
         """With `timer`, begin the next timestep if it is time for it."""
@@ -212,8 +255,8 @@ class WorldComponent(Component):
             return False, "the world runs: call world/pause with true first"
         if not self._world.owes:
             return False, "nothing is owed: time stands still until a command or a request comes"
-        if self._awaited.any:
-            return False, f"{', '.join(self._awaited.names())} have to order something first"
+        if self._waits:
+            return False, f"{', '.join(self._awaited.names() or [names.LEADER])} have to order something first"
         self._tell(self._world.step())
         self._end_period()
         return True, f"{self.stamp_ns / 1e9:.6f} s"
@@ -233,12 +276,15 @@ class WorldComponent(Component):
                 return  # a robot that takes no commands at all any more
         self._numbers[robot] = message.header.frame_id
         self._moving.add(robot)
+        if robot == names.LEADER:
+            self._leader_between = False
         self._awaited.ordered(robot)
 
     def _on_request(self, robot: str, message: Message) -> None:
         count = int(message.data)
         if count == 0 and self._parameters.schedule is not Schedule.TURNS:
             self._awaited.idle(robot)
+            self._end_if_stuck()
             return
         try:
             self._world.request_frames(robot, count)
@@ -251,6 +297,8 @@ class WorldComponent(Component):
         match event:
             case JointStates():
                 if event.final:
+                    if self._pushes and event.robot == names.LEADER and event.robot in self._moving:
+                        self._leader_between = True
                     self._moving.discard(event.robot)
                     self._awaited.rests(event.robot)
                 if event.timed_out and event.final:

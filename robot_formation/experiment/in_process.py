@@ -22,7 +22,7 @@ from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import NodeKind
 from robot_formation.components.world import WorldComponent
 from robot_formation.experiment.progress import Progress
-from robot_formation.experiment.run_result import RunError, RunResult
+from robot_formation.experiment.run_result import RunError, RunResult, joined_reasons
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import IMAGE_TYPE, Message, Topic, absolute
 from robot_formation.schedule.schedules import Spacing
@@ -63,7 +63,7 @@ class InProcessRun:
                 self._handlers.setdefault(name, []).append(entry.handler)
 
     def run(self) -> tuple[int, str]:
-        """Run until a component ends; return its exit code (0 done, 3 lost or off the plate), and why unless done.
+        """Run until a component ends; return the exit code (0 done, 3 lost or off the plate), and why unless done.
 
         Raises:
             RunError: if everybody waits for somebody, which no run should come to.
@@ -82,8 +82,7 @@ class InProcessRun:
             self._deliver()
             ended = [h.component for h in self._hosted if h.component.exit_code is not None]
             if ended:
-                code, reason = max((component.exit_code or 0, component.exit_reason) for component in ended)
-                return code, reason if code else ""
+                return self._ended(ended)
             if not world.busy:
                 for hosted in self._hosted:
                     hosted.component.stalled()
@@ -92,6 +91,13 @@ class InProcessRun:
                 last = f"; last warning: {self.warnings[-1]}" if self.warnings else ""
                 raise RunError(f"the run stands still: everybody waits for somebody{last}")
             world.work()
+
+    def _ended(self, ended: list[Component]) -> tuple[int, str]:
+        """Judge the run by who has ended it, and by who has failed before and held still since then."""
+        code, reason = max((component.exit_code or 0, component.exit_reason) for component in ended)
+        held = [hosted.component for hosted in self._hosted if hosted.component.held_code]
+        reasons = [component.held_reason for component in held]
+        return max([code, *(c.held_code for c in held)]), joined_reasons(reasons, reason if code else "")
 
     def _host(self, kind: NodeKind[P], robot: str) -> _Hosted:
         component = kind.component_class()(self.scenario.of_robot(kind, robot), Place(robot))

@@ -149,7 +149,10 @@ class Progress:
         if state.opens_timestep:
             heard.begun += 1
         elif state is AlignmentState.LOST:
-            self._say(f"{robot}: lost its beacon neighbour in timestep {heard.begun}")
+            why = message.data.partition(": ")[2]
+            self._say(
+                f"{robot}: lost its beacon neighbour in timestep {heard.begun}{f' ({why})' if why else ''} and stands"
+            )
 
     def _tell(self) -> None:
         for robot in self._followers:

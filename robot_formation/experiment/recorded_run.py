@@ -44,6 +44,7 @@ class Recording:
         details = bag.metadata(METADATA_NAME)
         self._parameters = node_parameters(details)
         self._slots = said_slots(details)
+        self._own_blackouts = mapping(details, "own_blackouts")
         self.notes = _changes({**mapping(details, "versions"), "commit": details.get("git_commit", "")})
         if not self._parameters:
             self.notes.append("the bag doesn't tell the nodes' parameters: the defaults are taken")
@@ -76,13 +77,13 @@ class Recording:
         """
         return list(self.messages(robot, topic)) if self.has(robot, topic) else []
 
-    def place(self, robot: str) -> JsonObject:
-        """Return the fine-tuner's parameters that say a follower's place; none if the run doesn't say it."""
+    def own_parameters(self, robot: str) -> JsonObject:
+        """Return the fine-tuner's parameters that are this follower's own: place and blackouts."""
+        own: JsonObject = {"blackouts": self._own_blackouts[robot]} if robot in self._own_blackouts else {}
         number = names.follower_number(robot)
-        if number > len(self._slots):
-            return {}
-        lateral_m, ahead_m = self._slots[number - 1]
-        return {"formation_distance_m": lateral_m, "formation_ahead_m": ahead_m}
+        if number <= len(self._slots):
+            own["formation_distance_m"], own["formation_ahead_m"] = self._slots[number - 1]
+        return own
 
     def parameters(self, kind: str, changes: JsonObject) -> Any:
         """Make a node's parameter object: as recorded, with some changed.

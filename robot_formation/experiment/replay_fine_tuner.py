@@ -12,7 +12,7 @@ from __future__ import annotations
 import copy
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from robot_formation import conversions, names
@@ -102,8 +102,9 @@ def replay_fine_tuner(recording: Recording, changes: JsonObject) -> list[FineTun
         )
     found = []
     for robot in recording.followers:
-        place = {name: value for name, value in recording.place(robot).items() if name not in changes}
-        found.append(_Driver(recording, robot, replace(parameters, **place)).run())
+        own = recording.own_parameters(robot)
+        its = recording.parameters("fine_tuner", {**own, **changes}) if own else parameters
+        found.append(_Driver(recording, robot, its).run())
     return found
 
 

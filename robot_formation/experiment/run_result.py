@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,6 +11,11 @@ from robot_formation.errors import FormationError
 
 class RunError(FormationError):
     """A run can't go on."""
+
+
+def joined_reasons(held: Sequence[str], ended: str) -> str:
+    """Say why a run ended: what robots that hold still have said, then what has ended it, if that says more."""
+    return "; ".join([*held, *([ended] if ended and ended not in held else [])])
 
 
 @dataclass

@@ -20,6 +20,7 @@ from robot_formation.components.node_parameters import (
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.chain_defaults import backdrop, unchecked_headings
+from robot_formation.experiment.disturbances import blackouts_of, pushes_of
 from robot_formation.experiment.formations import ABREAST, FORMATIONS, slots_of, starts_of
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.experiment.overhead_defaults import (
@@ -43,7 +44,7 @@ from robot_formation.koopman.predictors import Predictor, PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.parameters import (
     LENGTH_PAIRS,
-    PAIRS,
+    ROWS,
     ParameterError,
     check_as,
     flatten,
@@ -79,6 +80,7 @@ FOLLOWS_FROM_SETUP = {
         "schedule": "'schedule' of the scenario",
         "timesteps": "'leader.timesteps'",
         "period_s": "'leader.period_s'",
+        "pushes": "'pushes' of the scenario",
     },
     "block_detector": {"sensor": "'marker'"},
     "leader": {
@@ -130,19 +132,30 @@ class Setup:
     start_y_m: float = parameter(0.158, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
     heading_deg: float = parameter(90.0, "Heading of the formation", unit="deg", low=-360.0, high=360.0)
     marker: MarkerKind = parameter(MarkerKind.COLOURS, "What the robots' markers carry and their cameras look for")
-    blackouts: PAIRS = parameter(
-        (), "Timesteps without cameras: pairs of first timestep and length, like [[12, 3]]", low=1, high=1000000
+    blackouts: ROWS = parameter(
+        (), "Timesteps without cameras: [first timestep, length] for all, [follower_2, first timestep, length] for one"
+    )
+    pushes: ROWS = parameter(
+        (),
+        "Pushes, each as [robot, timestep, metres ahead, metres to the left]: when the leader's move of the timestep "
+        "has ended, the robot is displaced without turning its wheels",
     )
 
     def __post_init__(self) -> None:
-        """Check that blackouts don't overlap, and that the spacing fits the schedule."""
-        blind_timesteps(self.flat_blackouts, "'blackouts'")
+        """Check that blackouts and pushes are such, and that the spacing fits the schedule."""
+        for robot in self.robots:
+            self.blackouts_of(robot)
+        pushes_of(self.pushes)
         check_spacing(self.schedule, self.spacing)
 
     @property
-    def flat_blackouts(self) -> tuple[int, ...]:
-        """The blackouts' numbers one after another, as the fine-tuner has them."""
-        return tuple(number for pair in self.blackouts for number in pair)
+    def robots(self) -> list[str]:
+        """Names of the robots, the leader first."""
+        return [names.LEADER, *(names.follower(n) for n in range(1, self.followers + 1))]
+
+    def blackouts_of(self, robot: str = "") -> tuple[int, ...]:
+        """List first timesteps and lengths of a follower's blackouts, as its fine-tuner has them; '': those of all."""
+        return blackouts_of(self.blackouts, self.robots, robot)
 
 
 @dataclass(frozen=True)
@@ -169,7 +182,7 @@ class Scenario:
     @property
     def robots(self) -> list[str]:
         """Names of the robots, the leader first."""
-        return _robots(self.setup)
+        return self.setup.robots
 
     @property
     def slots(self) -> Slots:
@@ -190,6 +203,7 @@ class Scenario:
             found = replace(
                 found,
                 done_listeners=1 if robot == self.robots[-1] else 2,
+                blackouts=self.setup.blackouts_of(robot),
                 formation_distance_m=place.u_m,
                 formation_ahead_m=place.v_m,
             )
@@ -220,7 +234,8 @@ class Scenario:
         Raises:
             FormationError: naming what is wrong.
         """
-        last = max(blind_timesteps(self.setup.flat_blackouts), default=0)
+        blind = [blind_timesteps(self.setup.blackouts_of(robot)) for robot in self.robots]
+        last = max(frozenset().union(*blind), default=0)
         if last > self.leader.timesteps:
             raise ParameterError(
                 f"'blackouts' last until timestep {last}, but the run has only {self.leader.timesteps} timesteps; "
@@ -288,7 +303,7 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         values = {**node_defaults(kind, setup.marker), **settings.get(kind, {}), **follows}
         return from_mapping(cls, values, where=kind)
 
-    leader = made(LeaderParameters, "leader", followers=_robots(setup)[1:], seed=setup.seed, schedule=setup.schedule)
+    leader = made(LeaderParameters, "leader", followers=setup.robots[1:], seed=setup.seed, schedule=setup.schedule)
     timed = {"schedule": setup.schedule, "timesteps": leader.timesteps, "period_s": leader.period_s}
     if setup.slots and "formation_distance_m" in settings.get("fine_tuner", {}):
         raise ParameterError("'slots' say the distances, and 'fine_tuner.formation_distance_m' does too; keep one")
@@ -306,7 +321,8 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
     own, size_m = settings.get("world", {}), _plate_size(ground)
     follows = {
         "seed": setup.seed,
-        "robots": _robots(setup),
+        "robots": setup.robots,
+        "pushes": [push.text for push in pushes_of(setup.pushes)],
         **starts_of(setup.start_x_m, setup.start_y_m, setup.heading_deg, slots),
         **backdrop(setup.followers, own),
         **overhead_camera(size_m, own),
@@ -330,7 +346,7 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         made(
             FineTunerNodeParameters,
             "fine_tuner",
-            blackouts=setup.flat_blackouts,
+            blackouts=setup.blackouts_of(),
             spacing=setup.spacing,
             formation_distance_m=slots[0].u_m,
             formation_ahead_m=slots[0].v_m,
@@ -352,10 +368,6 @@ def _plate_size(ground: WorldNodeParameters) -> float:
 
 
 _KNOWN_FROM_ABOVE = ("robots", "start_x_m", "start_y_m", "surface", "surface_parameters")
-
-
-def _robots(setup: Setup) -> list[str]:
-    return [names.LEADER, *(names.follower(n) for n in range(1, setup.followers + 1))]
 
 
 def _slots(setup: Setup, distance_m: float) -> Slots:

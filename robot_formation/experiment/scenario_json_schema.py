@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robot_formation.components.catalogue import KINDS
 from robot_formation.experiment.scenario import FOLLOWS_FROM_SETUP, Setup
-from robot_formation.parameters import LIST_ELEMENTS, PAIR_ELEMENTS, Spec, specs
+from robot_formation.parameters import LENGTH_PAIRS, LIST_ELEMENTS, ROWS, Spec, specs
 
 _TYPES: dict[object, dict[str, object]] = {
     bool: {"type": "boolean"},
@@ -51,10 +51,12 @@ def _group(found: list[Spec], prefix: str) -> dict[str, object]:
 def _property(spec: Spec) -> dict[str, object]:
     unit = f" [{spec.unit}]" if spec.unit else ""
     said = {"description": spec.description + unit, "default": spec.plain_default()}
-    if spec.type in PAIR_ELEMENTS:
-        items = {**_TYPES[PAIR_ELEMENTS[spec.type]], **_limits(spec)}
-        pair = {"type": "array", "items": items, "minItems": 2, "maxItems": 2}
+    if spec.type == LENGTH_PAIRS:
+        pair = {"type": "array", "items": {**_TYPES[float], **_limits(spec)}, "minItems": 2, "maxItems": 2}
         return {**said, "type": "array", "items": pair}
+    if spec.type == ROWS:
+        row = {"type": "array", "items": {"type": ["number", "string"]}, "minItems": 2, "maxItems": 4}
+        return {**said, "type": "array", "items": row}
     if spec.type in LIST_ELEMENTS:
         return {**said, "type": "array", "items": {**_TYPES[LIST_ELEMENTS[spec.type]], **_limits(spec)}}
     return {**said, **_TYPES[spec.type], **_limits(spec)}

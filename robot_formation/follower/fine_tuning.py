@@ -173,7 +173,9 @@ class Done:
 
 @dataclass(frozen=True)
 class Lost:
-    """The leader is lost: the run ends in good order."""
+    """The neighbour is lost, and why: the follower stands from now on."""
+
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -223,6 +225,7 @@ class FineTuner:
         self._actuation_error: Motion | None = None
         self._frames: list[Sequence[Block]] = []
         self._frames_wanted = 0
+        self._looks = 0  # in this timestep
         self._extensions = 0
         self._look_from_ns = -1
         self.timestep = 0
@@ -285,8 +288,7 @@ class FineTuner:
             return []
         self._resent += 1
         if self._resent > self._p.look.max_requests:
-            self._phase = Phase.LOST
-            return [State(AlignmentState.LOST), Warn("the camera gives no frames any more"), Lost()]
+            return self._lose("the camera gives no frames any more")
         missing = self._frames_wanted - len(self._frames)
         return [Warn(f"{missing} frames of a look are missing: asked for again"), RequestFrames(missing)]
 
@@ -321,6 +323,7 @@ class FineTuner:
         self._alignment.restart(self.timestep, step)
         self._displacement = Motion()
         self._actuation_error = None
+        self._looks = 0
         if self.timestep == 0:
             return [State(AlignmentState.ALIGN), *self._look()]
         return self._go()
@@ -378,6 +381,9 @@ class FineTuner:
 
     def _look(self) -> list[Action]:
         self._phase = Phase.LOOK
+        if self._looks and self.rule.neighbour_corrects(self.timestep):
+            self._alignment.neighbour_corrects()
+        self._looks += 1
         self._frames = []
         self._frames_wanted = self._p.look.frames
         self._extensions = 0
@@ -401,8 +407,7 @@ class FineTuner:
 
     def _decide(self, decision: Decision) -> list[Action]:
         if decision.verdict is Verdict.LOST:
-            self._phase = Phase.LOST
-            return [State(AlignmentState.LOST), Lost()]
+            return self._lose(decision.reason)
         if decision.verdict is Verdict.LOOK:
             self._out_of_view = True
             return [State(AlignmentState.HOLD), *self._look()]
@@ -422,6 +427,10 @@ class FineTuner:
         if self.timestep == 0:
             return [*actions, *self._finish()]
         return [*actions, *self._report(self._alignment.offset())]
+
+    def _lose(self, reason: str) -> list[Action]:
+        self._phase = Phase.LOST
+        return [State(AlignmentState.LOST, reason), Lost(reason)]
 
     def _report(self, residual: UncertainMotion | None) -> list[Action]:
         self._phase = Phase.PREDICTION

@@ -14,13 +14,13 @@ from robot_formation import exit_codes
 from robot_formation.bag.bag_path import PARTIAL_SUFFIX, PathReservation, check_free, recover_hint
 from robot_formation.bag.errors import BagError
 from robot_formation.experiment.progress import Progress
-from robot_formation.experiment.run_result import RunError, RunResult
+from robot_formation.experiment.run_result import RunError, RunResult, joined_reasons
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
 from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
-from robot_formation.launching.outcome import recorder_failed, verdict
+from robot_formation.launching.outcome import holds_still, recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
 from robot_formation.leader.paths import Teleop
@@ -242,8 +242,16 @@ class Launcher:
                     result.exit_code, result.reason = exit_codes.NODE_DIED, f"node {child.name} {how}"
                 else:
                     result.warnings.append(f"node {child.name} {how}, after the run's end")
+            self._settle_lost(result)
         if self.bag is not None:
             self._settle_bag(self.bag, result)
+
+    def _settle_lost(self, result: RunResult) -> None:
+        """Judge what followers say that had lost their neighbours and held still until the run's end."""
+        held = [child for child in self._children if holds_still(child.process.executable, child.exit_code)]
+        if held and result.exit_code in _ORDERLY:
+            result.exit_code = exit_codes.LOST
+            result.reason = joined_reasons([child.last_words() for child in held], result.reason)
 
     def _settle_bag(self, bag: Path, result: RunResult) -> None:
         recorders = [child for child in self._children if child.process.executable == RECORDER]

@@ -29,6 +29,11 @@ def recorder_failed(executable: str, code: int | None) -> bool:
     return executable == RECORDER and code != exit_codes.DONE
 
 
+def holds_still(executable: str, code: int | None) -> bool:
+    """Return whether a node is the fine-tuner of a follower that has lost its neighbour."""
+    return executable == "fine_tuner" and code == exit_codes.LOST
+
+
 def manner(code: int) -> str:
     """Describe how a process ended."""
     return f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
@@ -68,6 +73,8 @@ class LaunchedRun:
             self.exit_code = exit_codes.INTERRUPTED if stopping else verdict(executable, code)
             if self.exit_code not in (exit_codes.DONE, exit_codes.INTERRUPTED):
                 self.reason = f"{name} {manner(code)}"
+        if holds_still(executable, code) and self.exit_code == exit_codes.DONE:
+            self.exit_code, self.reason = exit_codes.LOST, f"{name} {manner(code)}"
         if recorder_failed(executable, code) and self.exit_code in _WORDS:
             self.exit_code, self.reason = exit_codes.NODE_DIED, f"{name} {manner(code)}"
         return first and not stopping

@@ -91,7 +91,9 @@ def _inside(namespace: str, robot: str) -> str:
 
 def run_metadata(scenario: Scenario) -> dict[str, str]:
     """Describe a run for the bag's metadata record: scenario, seed, what ran with which parameters and versions."""
-    world = scenario.world
+    world, setup = scenario.world, scenario.setup
+    blind = {robot: setup.blackouts_of(robot) for robot in scenario.robots[1:]}
+    own = {robot: found for robot, found in blind.items() if found != setup.blackouts_of()}
     return {
         "scenario": scenario.setup.name,
         "seed": str(scenario.setup.seed),
@@ -107,4 +109,5 @@ def run_metadata(scenario: Scenario) -> dict[str, str]:
         "camera_calibration": json.dumps(camera_values(scenario.fine_tuner)),
         "versions": json.dumps(versions()),
         "git_commit": git_commit(),
+        **({"own_blackouts": json.dumps(own)} if own else {}),
     }

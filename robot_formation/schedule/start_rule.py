@@ -21,6 +21,7 @@ class StartRule:
         schedule: Schedule = Schedule.TURNS,
         spacing: Spacing = Spacing.RIGID,
         *,
+        first: bool = True,
         last: bool = True,
         period_s: float = 0.0,
         timesteps: int = 0,
@@ -30,6 +31,7 @@ class StartRule:
         Args:
             schedule: who waits for whom.
             spacing: what the place is.
+            first: whether the robot on the left is the leader, which corrects nothing.
             last: whether no robot stands on the right.
             period_s: of `timer`.
             timesteps: of the run, for schedules in which nobody says that it has ended.
@@ -38,6 +40,7 @@ class StartRule:
         self.delayed = spacing is Spacing.DELAYED
         self.left = self.right = -1
         self.now_ns = 0
+        self._first = first
         self._last = last
         self._period_s = period_s
         self._timesteps = timesteps
@@ -55,6 +58,10 @@ class StartRule:
                     and (self._last or timestep == 0 or self.right >= timestep - 1)
                 )
         return self.left >= timestep
+
+    def neighbour_corrects(self, timestep: int) -> bool:
+        """Whether the robot on the left may correct its place at the same time as this one."""
+        return self.schedule.at_once and timestep > 0 and not self._first and self.corrects(timestep)
 
     def corrects(self, timestep: int) -> bool:
         """Whether corrections follow the look; else what is left goes into the next timestep's move."""

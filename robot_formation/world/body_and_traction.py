@@ -156,6 +156,13 @@ class Body:
         )
         self.freeze()
 
+    def shift(self, pose: Pose) -> None:
+        """Put base_link at a pose with the velocities that it has; wheels and encoders keep their state."""
+        velocities, speeds = _read_velocity(self.index, self._client), self.encoder_speeds
+        self.place(pose)
+        pybullet.resetBaseVelocity(self.index, *velocities, physicsClientId=self._client)
+        self.encoder_speeds = speeds
+
     def freeze(self) -> None:
         """Set all velocities to zero."""
         pybullet.resetBaseVelocity(self.index, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=self._client)

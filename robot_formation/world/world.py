@@ -13,6 +13,7 @@ from robot_formation.world.checks import Command, WorldError, check_command, che
 from robot_formation.world.events import BodyState, Event, Frame, JointStates, LeftPlate, RobotPose
 from robot_formation.world.parameters import CameraMode, WorldParameters
 from robot_formation.world.pose import Pose, off_plate
+from robot_formation.world.pushes import Push, displaced
 from robot_formation.world.robot import Robot
 from robot_formation.world.sensor import Development, Sensor
 from robot_formation.world.start import RobotStart
@@ -128,6 +129,23 @@ class World:
         if all(name in self._pending for name in lockstep):
             for name in lockstep:
                 self._robots[name].begin(*self._pending.pop(name))
+
+    def push(self, push: Push) -> None:
+        """Displace a robot at once: whatever it does goes on from there, its wheels and encoders don't notice.
+
+        Raises:
+            WorldError: on an unknown robot, one that has left the plate or would leave it, or one that would stand in
+                another. Nothing moves then.
+        """
+        robot = self._robot(push.robot)
+        before = robot.body.pose()
+        after = displaced(before, self.surface, push, self.parameters.wheels)
+        if robot.held or off_plate(self.surface, after, self.parameters.marker.top_m) is not None:
+            raise WorldError(f"robot '{robot.name}' can't be pushed beyond the plate's edge")
+        robot.body.shift(after)
+        if self._touched(robot):
+            robot.body.shift(before)
+            raise WorldError(f"robot '{robot.name}' can't be pushed: it would stand in another robot")
 
     def request_frames(self, robot: str, count: int) -> None:
         """Ask for `count` more frames of a robot's camera, stamped later than now.
@@ -255,6 +273,14 @@ class World:
         if robot is None:
             raise WorldError(f"no robot '{name}'{suggestion(name, self._robots)}")
         return robot
+
+    def _touched(self, robot: Robot) -> bool:
+        """Whether a robot's body touches another one's."""
+        return any(
+            pybullet.getClosestPoints(robot.body.index, other.body.index, 0.0, physicsClientId=self._client)
+            for other in self._robots.values()
+            if other is not robot
+        )
 
     def _check_overlap(self) -> None:
         robots = list(self._robots.values())

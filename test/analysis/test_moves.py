@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_formation.analysis.from_bag import load_run
-from robot_formation.analysis.moves import UNKNOWN, Loss, losses, move_totals, moves_of, summed
+from robot_formation.analysis.moves import UNKNOWN, Loss, losses, lost_at, move_totals, moves_of, summed
 from robot_formation.analysis.quantities import FollowerAnalysis, analyse
 from robot_formation.analysis.report import text_report, to_json
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
@@ -176,6 +176,7 @@ def test_a_run_without_timesteps_has_no_moves() -> None:
         "movements_median": None,
         "movements_max": None,
         "losses": [],
+        "lost": None,
         "reacquired": 0,
         "reacquisition_median_s": None,
         "reacquisition_max_s": None,
@@ -228,3 +229,12 @@ def test_a_bag_and_the_run_in_memory_give_the_same_analysis(tmp_path: Path) -> N
     assert len(follower.commands) == len(follower.moved) > 4
     assert list(follower.state_stamps_ns) == sorted(follower.state_stamps_ns)
     assert json.loads(to_json(analyse(from_bag)))["timesteps"] == json.loads(to_json(analyse(in_memory)))["timesteps"]
+
+
+def test_a_follower_that_gave_up_is_told_with_timestep_time_and_reason() -> None:
+    states = ("align", "aligned", "collect", "hold", "lost: not found again in 4 looks")
+    follower = FollowerRecord("follower_1", states=states, state_stamps_ns=(0, 1, 2, 3, 4_500_000_000))
+    assert lost_at(follower) == {"t": 1, "seconds": 4.5, "reason": "not found again in 4 looks"}
+    older = FollowerRecord("follower_1", states=("align", "lost"))
+    assert lost_at(older) == {"t": 0, "seconds": None, "reason": None}
+    assert lost_at(FollowerRecord("follower_1", states=states[:-1])) is None

@@ -118,3 +118,43 @@ def test_nothing_is_awaited_after_the_last_timestep() -> None:
     awaited.rests("leader")
     awaited.idle("leader")
     assert not awaited.any
+
+
+@pytest.mark.parametrize("schedule", [Schedule.WAVE, Schedule.TOGETHER])
+def test_a_lost_robot_is_not_awaited_and_the_run_is_stuck_once_the_others_have_nothing_to_do(
+    schedule: Schedule,
+) -> None:
+    awaited = AwaitedRobots(schedule, ROBOTS, 5, 1.0)
+    awaited.ordered("follower_1", frames=True)
+    awaited.looked("follower_1")
+    assert not awaited.stuck
+    awaited.give_up("follower_1")
+    assert awaited.names() == []
+    assert awaited.stuck
+
+
+def test_others_finish_what_they_have_begun_before_the_run_is_stuck() -> None:
+    awaited = AwaitedRobots(Schedule.TOGETHER, ROBOTS, 5, 1.0)
+    for robot in ROBOTS[1:]:
+        awaited.begun(robot, 0)
+        awaited.ordered(robot)
+        awaited.rests(robot)
+        awaited.idle(robot)
+    awaited.begun("leader", 1)
+    for robot in ROBOTS:
+        awaited.ordered(robot)
+        awaited.rests(robot)
+    awaited.idle("leader")
+    awaited.give_up("follower_1")
+    assert awaited.names() == ["follower_2"]
+    assert not awaited.stuck
+    awaited.idle("follower_2")
+    assert awaited.stuck
+
+
+@pytest.mark.parametrize("schedule", [Schedule.TURNS, Schedule.TIMER])
+def test_a_run_by_turns_or_by_the_clock_is_never_stuck(schedule: Schedule) -> None:
+    awaited = AwaitedRobots(schedule, ROBOTS, 5, 1.0)
+    for robot in ROBOTS[1:]:
+        awaited.give_up(robot)
+    assert not awaited.stuck

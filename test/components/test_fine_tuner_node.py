@@ -16,6 +16,7 @@ from robot_formation.vision.pixy2.block import Block
 BASE, CAMERA = "follower_1/base_link", "follower_1/camera_optical_frame"
 IN_PLACE = [Block(Face.TARGET, 158, 60, 49, 49)]
 LOOK = {"frames": 1, "stable_frames": 1}
+LONGEST_LOOK = 200
 NEIGHBOUR, OWN = "/formation/leader/done", "/formation/follower_1/done"
 
 
@@ -130,6 +131,28 @@ def test_answers_that_nobody_asked_for_warn_and_change_nothing(wire: Wire, topic
 def test_a_lost_leader_ends_the_run_with_the_exit_code_for_it() -> None:
     wire = wired("fine_tuner", "follower_1", mode="paper", look=LOOK, alignment={"max_empty_looks": 1})
     wire.give(NEIGHBOUR, tick(0))
-    assert plain(wire.give("blocks", blocks([], 10))) == [("alignment", "lost")]
+    assert plain(wire.give("blocks", blocks([], 10))) == [("alignment", "lost: no block in view")]
     assert wire.component.exit_code == exit_codes.LOST == 3
-    assert wire.component.exit_reason == "follower_1 lost its beacon neighbour in timestep 0"
+    assert wire.component.exit_reason == "follower_1 lost its beacon neighbour in timestep 0: no block in view"
+
+
+@pytest.mark.parametrize("schedule", ["wave", "together", "timer"])
+def test_where_others_may_go_on_a_follower_that_is_lost_holds_still(schedule: str) -> None:
+    wire = wired(
+        "fine_tuner", "follower_1", mode="paper", look=LOOK, alignment={"max_empty_looks": 1}, schedule=schedule
+    )
+    if schedule == "timer":
+        wire.component.start()
+    else:
+        wire.give(NEIGHBOUR if schedule == "wave" else "/formation/leader/begun", tick(0))
+    for stamp_ns in range(10, 10 + LONGEST_LOOK):
+        wire.give("blocks", blocks([], stamp_ns))
+    assert wire.component.exit_code is None
+    assert wire.component.held_code == exit_codes.LOST
+    assert wire.warnings == ["follower_1 lost its beacon neighbour in timestep 0: no block in view"]
+    sent = len(wire.sent)
+    for topic in wire.inputs:
+        if topic.startswith("/formation/"):
+            wire.give(topic, tick(1))
+    wire.give("blocks", blocks(IN_PLACE, 1000))
+    assert len(wire.sent) == sent

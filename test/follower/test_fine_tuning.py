@@ -440,7 +440,7 @@ def test_a_leader_that_stays_out_of_view_is_lost_after_the_bound_of_looks() -> N
     script = Script(alignment={"max_empty_looks": 2})
     script.tick(0)
     assert script.look([]) == [State(AlignmentState.HOLD), RequestFrames(FRAMES)]
-    assert script.look([]) == [State(AlignmentState.LOST), Lost()]
+    assert script.look([]) == [State(AlignmentState.LOST, "no block in view"), Lost("no block in view")]
     assert script.tuner.phase is Phase.LOST
 
 

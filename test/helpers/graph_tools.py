@@ -115,15 +115,19 @@ class BusyCores:
 
 
 class Killer:
-    """Sends a signal to one node of a run, or to another process, when the run has finished a number of timesteps."""
+    """Sends a signal to one node of a run, or to another process, when the run has finished a number of timesteps.
 
-    def __init__(self, node: str, number: signal.Signals, after_timesteps: int) -> None:
-        self._node, self._number, self._after = node, number, after_timesteps
+    Where there are several followers, `robot` is the one whose timesteps count.
+    """
+
+    def __init__(self, node: str, number: signal.Signals, after_timesteps: int, robot: str = "") -> None:
+        self._node, self._number = node, number
+        self._line = f"{robot}  " * bool(robot) + f"timestep {after_timesteps:2d}/"
         self.pids: dict[str, int] = {}
 
     def started(self, domain: int, pids: Mapping[str, int]) -> None:
         self.pids = dict(pids)
 
     def say(self, text: str) -> None:
-        if text.startswith(f"timestep {self._after:2d}/"):
+        if text.startswith(self._line):
             os.kill(self.pids[self._node], self._number)

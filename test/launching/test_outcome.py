@@ -61,3 +61,12 @@ def test_the_end_of_the_node_that_tells_the_progress_is_no_end_of_the_run() -> N
     run, firsts = ended(("progress", -9), ("leader", 0), ("world", 0))
     assert firsts == [False, True, False]
     assert (run.complete, run.failed, str(run)) == (True, False, "outcome: done, bag my_bag")
+
+
+def test_a_follower_that_held_still_makes_a_lost_run_of_one_that_the_leader_ended() -> None:
+    run = LaunchedRun(2, "my_bag")
+    assert run.ended("/leader/leader", "leader", 0, stopping=False)
+    assert not run.ended("/follower_1/fine_tuner", "fine_tuner", 3, stopping=True)
+    assert run.exit_code == 3
+    assert run.failed
+    assert str(run) == "outcome: lost (/follower_1/fine_tuner ended with exit code 3), bag my_bag"

@@ -191,8 +191,15 @@ class PoseFilter:
 
     def doubt_heading(self, sigma_rad: float) -> None:
         """Take the heading for less certain than looks and forecasts made it, by an error of this deviation."""
+        self._doubt((YAW,), sigma_rad)
+
+    def neighbour_corrects(self, sigma_m: float) -> None:
+        """Take the neighbour's position for less certain: it may have corrected its own since the last look."""
+        self._doubt((X, Y), sigma_m)
+
+    def _doubt(self, components: Sequence[int], sigma: float) -> None:
         variance = np.zeros((SIZE, SIZE))
-        variance[YAW, YAW] = sigma_rad**2
+        variance[components, components] = sigma**2
         for hypothesis in self.hypotheses:
             hypothesis.covariance = hypothesis.covariance + variance
 

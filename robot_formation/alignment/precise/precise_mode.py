@@ -45,6 +45,8 @@ _VIEWPOINT_NEARER_M = 0.008
 """How much nearer to the neighbour than in formation these places lie."""
 _VIEWPOINT_TOLERANCE = Motion(0.02, 0.02, math.radians(6.0))
 """How far from such a place is near enough."""
+_CORRECTION_SIGMA_M = 0.02
+"""Standard deviation of a neighbour's correction that may have happened between two looks, along each axis."""
 _SPARE_MOVES = 2
 """Moves left over for last corrections."""
 _ENOUGH_MOVES = 6
@@ -147,6 +149,10 @@ class PreciseAlignment:
         self._check.stepped(neighbours.mean.yaw_rad)
         self._stepped = True
         self._filter.neighbour_stepped(neighbours, self._actuation.drives_so_far, timestep == 1)
+
+    def neighbour_corrects(self) -> None:
+        """The neighbour may have moved since the last look: it corrects at the same time."""
+        self._filter.neighbour_corrects(_CORRECTION_SIGMA_M)
 
     def turn(self, forecast_rad: float) -> float:
         """Return the turn [rad] to make with the prediction move."""

@@ -201,7 +201,9 @@ class Host:
                 if ready and self._pacer.left_s <= 0.0:
                     component.work()
                     self._pacer.worked(component.stamp_ns)
-            if component.exit_code is not None:
+            if component.exit_code or component.held_code:
+                self._say(0, component.exit_reason or component.held_reason)
+            elif component.exit_code is not None:
                 self._say(0, component.exit_reason)
             self._publish_health()
         finally:
@@ -210,7 +212,7 @@ class Host:
                 publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
             executor.shutdown()
             component.close()
-        return component.exit_code or 0
+        return component.exit_code or component.held_code
 
     def _send(self, topic: names.Topic, message: Message) -> None:
         # Transforms first: a recorder that gets the message has found their topics, and makes none of its own.
