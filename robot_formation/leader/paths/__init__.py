@@ -16,6 +16,7 @@ from robot_formation.leader.paths.circle import Circle
 from robot_formation.leader.paths.clothoid import Clothoid
 from robot_formation.leader.paths.figures import Lemniscate, Lissajous
 from robot_formation.leader.paths.random_walk import RandomWalk
+from robot_formation.leader.paths.speeds import Chirp, SpeedStep, Stop
 from robot_formation.leader.paths.stadium import Stadium
 from robot_formation.leader.paths.straight import Straight
 from robot_formation.leader.paths.switch import Switch
@@ -27,7 +28,7 @@ from robot_formation.parameters import ParameterError, from_mapping, read_texts,
 __all__ = ["PATHS", "Given", "LeaderPath", "PathKind", "Room", "Teleop", "make_path", "path_kind", "poses"]
 
 _KINDS: tuple[type[PathKind], ...] = (
-    *(Straight, Circle, Arc, Slalom, Pulse, Lemniscate, Lissajous, Stadium, Clothoid),
+    *(Straight, Circle, Arc, Slalom, Pulse, SpeedStep, Stop, Chirp, Lemniscate, Lissajous, Stadium, Clothoid),
     *(Switch, RandomWalk, Waypoints, Teleop),
 )
 
