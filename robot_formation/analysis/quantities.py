@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.chain import chain_totals, moves_of_timestep, pose, pose_at_end
 from robot_formation.analysis.errors import AnalysisError
+from robot_formation.analysis.in_motion import motion_totals
 from robot_formation.analysis.moves import Moves, is_blind, move_totals, movements_of, moves_of
 from robot_formation.analysis.quantiles import ELLIPSE_90, NORMAL_90
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
@@ -185,6 +186,7 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
     values["path_length_m"] = {robot: track.length_m for robot, track in record.tracks.items()}
     values["overhead_error_m"] = overhead_errors(record)
     values["simulated_seconds"] = record.simulated_s
+    values.update(motion_totals(record, follower))
     return FollowerAnalysis(follower.name, follower.lost, timesteps, unfinished, values)
 
 

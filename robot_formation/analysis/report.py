@@ -126,6 +126,7 @@ def _totals(follower: FollowerAnalysis) -> list[str]:
         *_moves(values),
         *_losses(values),
         ("formation error", _formation_error(values)),
+        *_at_worst(values),
         ("heading error", f"RMSE {_scaled(values['heading_error_rmse_rad'], math.degrees(1.0))} deg"),
         ("path", ", ".join(f"{robot} {length:.3f} m" for robot, length in values["path_length_m"].items()) or _NONE),
         *_overhead_error(values),
@@ -175,6 +176,19 @@ def _formation_error(values: JsonObject) -> str:
     keys = ("rmse_m", "bias_u_m", "bias_v_m", "scatter_m")
     rmse, bias_u, bias_v, scatter = (_scaled(values[f"formation_error_{key}"], 100.0) for key in keys)
     return f"RMSE {rmse} cm (bias u {bias_u}, v {bias_v}; scatter {scatter})"
+
+
+def _at_worst(values: JsonObject) -> list[tuple[str, str]]:
+    if values["formation_error_moving_max_m"] is None or values["gap_min_m"] is None:
+        return []
+    end, moving, gap = (
+        _scaled(values[key], 100.0) for key in ("formation_error_max_m", "formation_error_moving_max_m", "gap_min_m")
+    )
+    touched = f", touches {values['touches']}" if values["touches"] else ""
+    return [
+        ("  largest", f"at ends of timesteps {end} cm, in motion {moving} cm"),
+        ("gap to the neighbour's body", f"at least {gap} cm{touched}"),
+    ]
 
 
 def _overhead_error(values: JsonObject) -> list[tuple[str, str]]:

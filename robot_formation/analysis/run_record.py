@@ -155,11 +155,15 @@ class RunRecord:
     @property
     def dot_height_m(self) -> float:
         """Height of the reference dot above base_link, metres: what the run says, else the paper's robot's."""
+        return self.world_number("marker.top_m", DOT_HEIGHT_M)
+
+    def world_number(self, name: str, default: float) -> float:
+        """Return a parameter of the run's world; the default where it says none, or no finite number above 0."""
         try:
-            said = float(node_parameters(self.details)["world"]["marker.top_m"])
+            said = float(node_parameters(self.details)["world"][name])
         except (KeyError, ValueError, TypeError, OverflowError):
-            return DOT_HEIGHT_M
-        return said if math.isfinite(said) else DOT_HEIGHT_M
+            return default
+        return said if math.isfinite(said) and said > 0.0 else default
 
     @property
     def formation_distance_m(self) -> float:

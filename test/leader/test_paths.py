@@ -47,7 +47,9 @@ def test_a_path_is_a_pure_function_of_timestep_and_seed(name: str) -> None:
     assert all(step.finite for step in forward)
 
 
-@pytest.mark.parametrize("name", ["circle", "slalom", "pulse", "chirp", "lemniscate", "lissajous", "stadium", "random_walk"])
+@pytest.mark.parametrize(
+    "name", ["circle", "slalom", "pulse", "chirp", "lemniscate", "lissajous", "stadium", "random_walk"]
+)
 def test_another_seed_gives_another_phase_and_a_given_phase_stays(name: str) -> None:
     assert path(name, given=Given(seed=1)).motion(1) != path(name, given=Given(seed=2)).motion(1)
     if name != "random_walk":
@@ -55,7 +57,13 @@ def test_another_seed_gives_another_phase_and_a_given_phase_stays(name: str) -> 
         assert first.motion(1) == path(name, "phase=0.3", given=Given(seed=2)).motion(1)
 
 
-@pytest.mark.parametrize("name", ["straight", "circle", "arc", "slalom", "pulse", "speed_step", "stop", "chirp", "stadium", "clothoid", "random_walk"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("straight", "circle", "arc", "slalom", "pulse", "speed_step", "stop", "chirp"),
+        *("stadium", "clothoid", "random_walk"),
+    ],
+)
 def test_the_leaders_step_is_the_default_of_a_paths_own(name: str) -> None:
     made = path(name, given=Given(step_m=0.03, seed=5))
     assert [made.motion(t) for t in (1, 2)] == [path(name, "step_m=0.03").motion(t) for t in (1, 2)]
