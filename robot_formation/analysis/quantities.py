@@ -40,6 +40,7 @@ from robot_formation.analysis.in_motion import motion_totals
 from robot_formation.analysis.moves import Moves, is_blind, move_totals, movements_of, moves_of
 from robot_formation.analysis.quantiles import ELLIPSE_90, NORMAL_90
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
+from robot_formation.analysis.string_stability import string_stability
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.json_values import JsonObject
 from robot_formation.names import beacon_neighbour
@@ -119,17 +120,22 @@ class FollowerAnalysis:
 
 @dataclass(frozen=True)
 class RunAnalysis:
-    """A run's scenario, outcome (done, lost, left_plate or incomplete) and followers."""
+    """A run's scenario, outcome (done, lost, left_plate or incomplete) and followers.
+
+    `string_stability` is None with one follower.
+    """
 
     scenario: str | None
     outcome: str
     followers: tuple[FollowerAnalysis, ...]
+    string_stability: JsonObject | None = None
 
     def to_json(self) -> JsonObject:
-        """Return the command line's JSON: the first follower's, and each one's where there are several."""
+        """Return the command line's JSON: the first follower's, and what there is more where there are several."""
         result = {"scenario": self.scenario, "outcome": self.outcome, **self.followers[0].to_json()}
         if len(self.followers) > 1:
             result["followers"] = {follower.name: follower.to_json() for follower in self.followers}
+            result["string_stability"] = self.string_stability
         return result
 
 
@@ -142,7 +148,9 @@ def analyse(record: RunRecord) -> RunAnalysis:
     if not record.followers:
         raise AnalysisError("the run has no follower; give the record of a formation run")
     followers = tuple(analyse_follower(record, follower) for follower in record.followers)
-    return RunAnalysis(record.details.get("scenario"), _outcome(record, followers), followers)
+    errors_m = [[timestep.formation_error_m for timestep in follower.timesteps] for follower in followers]
+    chain = string_stability(record, errors_m)
+    return RunAnalysis(record.details.get("scenario"), _outcome(record, followers), followers, chain)
 
 
 def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAnalysis:

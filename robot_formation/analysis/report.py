@@ -43,6 +43,8 @@ def text_report(record: RunRecord, analysis: RunAnalysis) -> str:
             sections.append(follower.name.replace("_", " "))
         sections.append("\n".join(_table(follower)))
         sections.append("\n".join(_totals(follower)))
+    if analysis.string_stability is not None:
+        sections.append("\n".join(["along the chain", *_along_the_chain(analysis.string_stability)]))
     sections.append(f"outcome: {analysis.outcome}")
     return "\n\n".join(sections)
 
@@ -188,6 +190,25 @@ def _at_worst(values: JsonObject) -> list[tuple[str, str]]:
     return [
         ("  largest", f"at ends of timesteps {end} cm, in motion {moving} cm"),
         ("gap to the neighbour's body", f"at least {gap} cm{touched}"),
+    ]
+
+
+def _along_the_chain(values: JsonObject) -> list[str]:
+    """List ratios from each robot to the next; one column per follower, from the second on where errors are meant."""
+    hops = values["hops"]
+    rows = [
+        (f"error to that of the one before, {name}", ["", *(_scaled(hop[key], 1.0) for hop in hops)])
+        for name, key in (("RMS", "error_ratio_l2"), ("max", "error_ratio_linf"))
+    ]
+    rows += [
+        (f"gain along {found['axis']}, period {found['period']:.1f}", [_scaled(gain, 1.0) for gain in found["hops"]])
+        for found in values["gains"]
+    ]
+    width = max(len(name) for name, _ in rows)
+    numbers = [str(number) for number in range(1, len(hops) + 2)]
+    return [
+        "".join([name.ljust(width), *(cell.rjust(6) for cell in cells)])
+        for name, cells in [("follower", numbers), *rows]
     ]
 
 
