@@ -22,6 +22,7 @@ import itertools
 import math
 import os
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -66,8 +67,8 @@ def timesteps(task: Task) -> int:
     return 20 if task.path == "straight" or task.ground == "six_metres" else 30
 
 
-def build(task: Task) -> scenarios.Scenario:
-    """Make a run's scenario."""
+def build(task: Task, more: Sequence[str] = ()) -> scenarios.Scenario:
+    """Make a run's scenario, with more settings KEY=VALUE."""
     track, ground = GROUNDS[task.ground]
     path, *parameters = PATHS[task.path]
     schedule, _, spacing = task.schedule.partition("+")
@@ -81,13 +82,14 @@ def build(task: Task) -> scenarios.Scenario:
         f"schedule={schedule}",
         f"spacing={spacing or 'rigid'}",
         f"seed={task.seed}",
+        *more,
     ]
     return scenarios.override(scenarios.load_track(track), settings)
 
 
-def run_task(task: Task) -> list[Row]:
+def run_task(task: Task, more: Sequence[str] = ()) -> list[Row]:
     """Carry out one run."""
-    scenario = build(task)
+    scenario = build(task, more)
     scenario.check()
     cpu_s, wall_s = time.process_time(), time.perf_counter()
     record = run_in_memory(scenario)
@@ -152,7 +154,7 @@ def carry_out(args: argparse.Namespace) -> int:
         )
     ]
     table, tasks = missing(args.out, Row, chosen)
-    for rows in with_progress(run_parallel(run_task, ((task,) for task in tasks), args.jobs), len(tasks)):
+    for rows in with_progress(run_parallel(run_task, ((task, args.set) for task in tasks), args.jobs), len(tasks)):
         table.append(rows)
     return 0
 
@@ -187,6 +189,7 @@ def main() -> int:
     runner.add_argument("--schedules", type=names, default=list(SCHEDULES))
     runner.add_argument("--paths", type=names, default=list(CHAIN_PATHS))
     runner.add_argument("--grounds", type=names, default=["six_metres"])
+    runner.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="in all runs of OUT")
     runner.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     runner.set_defaults(run=carry_out)
     reporter = verbs.add_parser("report", help="print the tables")

@@ -29,7 +29,10 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True)
 class Row:
-    """A follower's part of a run; None where unavailable. `gains`: from the robot before, like 'v10.0=1.05 v5.0=1.2'."""
+    """A follower's part of a run; None where unavailable.
+
+    `gains` are from the robot before, by axis and period in timesteps, like 'v10.0=1.05 v5.0=1.2'.
+    """
 
     ground: str
     path: str
@@ -151,8 +154,8 @@ NAMED = ("ground", "path", "schedule", "N")
 
 def errors_table(cases: dict[Case, list[Run]]) -> list[str]:
     """Formation errors of follower 1, the middle one and N; their largest; touches and smallest gap."""
-    heads = (*NAMED, "runs", "not done", "with touches", "RMSE, cm", f"RMSE from timestep {LATE}, cm", "to a single one",
-             "to turns", "max, cm", "max in motion, cm", "least gap, cm")  # fmt: skip
+    heads = (*NAMED, "runs", "not done", "with touches", "RMSE, cm", f"RMSE from timestep {LATE}, cm",
+             "to a single one", "to turns", "max, cm", "max in motion, cm", "least gap, cm")  # fmt: skip
     lines = []
     for case, runs in cases.items():
         single = cases.get(case._replace(followers=1)) if case.followers > 1 else None
@@ -274,6 +277,7 @@ def draw(cases: dict[Case, list[Run]], ground: str, path: str, out: Path) -> Pat
 
 
 def _draw_errors(axes: Any, cases: dict[Case, list[Run]]) -> None:
+    most = 0.0
     for schedule, (colour, marker) in STYLE.items():
         counts = [case.followers for case in cases if case.schedule == schedule]
         if not counts or max(counts) < 2:
@@ -282,10 +286,13 @@ def _draw_errors(axes: Any, cases: dict[Case, list[Run]]) -> None:
         errors = 100.0 * np.array(medians(cases[longest], "formation_error_rmse_m"))
         numbers = np.arange(1, len(errors) + 1)
         axes.plot(numbers, errors, color=colour, marker=marker, markersize=4, label=schedule)
+        most = max(most, float(errors.max()))
         if schedule == "timer":
             growth = errors[0] * np.array(persistence_growth(len(errors)))
             axes.plot(numbers, growth, color=colour, linestyle=":", label="timer, theory of persistence")
     axes.set_yscale("log")
+    if most:
+        axes.set_ylim(0.1, 4.0 * most)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set(xlabel="follower", ylabel="formation error, RMS (cm)", title="Error along the chain")
