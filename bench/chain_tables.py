@@ -195,11 +195,11 @@ def stability_table(cases: dict[Case, list[Run]]) -> list[str]:
 
 
 def gains_table(cases: dict[Case, list[Run]]) -> list[str]:
-    """Gains by frequency, geometric mean over hops and runs, beside persistence's."""
+    """Gains by frequency, geometric mean over hops and runs, beside persistence's; also of runs that ended early."""
     lines = []
     for case, runs in cases.items():
         by_frequency: dict[tuple[str, float], list[list[float]]] = {}
-        for run in done(runs):
+        for run in runs:
             told = [dict(part.split("=") for part in row.gains.split()) for row in run]
             for key in told[0]:
                 of_hops = [float(gains[key]) for gains in told if key in gains]
@@ -271,7 +271,7 @@ def draw(cases: dict[Case, list[Run]], ground: str, path: str, out: Path) -> Pat
     left, right = figure.subplots(1, 2)
     _draw_errors(left, chosen)
     _draw_times(right, chosen)
-    handles = {handle.get_label(): handle for axes in (left, right) for handle in axes.get_legend_handles_labels()[0]}
+    handles = {handle.get_label(): handle for axes in (right, left) for handle in axes.get_legend_handles_labels()[0]}
     legend_below(figure, list(handles.values()), 4, fontsize=9)
     return save_figure(figure, out)
 
@@ -291,10 +291,11 @@ def _draw_errors(axes: Any, cases: dict[Case, list[Run]]) -> None:
             growth = errors[0] * np.array(persistence_growth(len(errors)))
             axes.plot(numbers, growth, color=colour, linestyle=":", label="timer, theory of persistence")
     axes.set_yscale("log")
-    if most:
-        axes.set_ylim(0.1, 4.0 * most)
+    axes.set_yticks([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0])
+    axes.set_ylim(0.1, 4.0 * max(most, 1.0))
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.yaxis.set_minor_formatter("")
+    axes.set_xticks(range(1, 11))
     axes.set(xlabel="follower", ylabel="formation error, RMS (cm)", title="Error along the chain")
     axes.grid(which="both", alpha=0.3)
 
@@ -320,6 +321,7 @@ def _draw_times(axes: Any, cases: dict[Case, list[Run]]) -> None:
         elif schedule == "timer":
             axes.plot(ends, [times.mean()] * 2, color=colour, linestyle="--", label="constant")
     axes.set_ylim(bottom=0.0)
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.set_xlim(0.5, 10.5)
+    axes.set_xticks(range(1, 11))
     axes.set(xlabel="followers", ylabel="simulated time per timestep (s)", title="Time per timestep")
     axes.grid(alpha=0.3)
