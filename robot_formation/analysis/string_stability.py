@@ -11,8 +11,7 @@ error ratios
     of a follower's formation errors to those of the follower before it: of their root mean squares (L2), and of their
     maxima (L-infinity).
 gain
-    |X_i / X_(i-1)| of the displacements' spectra, at the frequencies that dominate the leader's motion. Over several
-    runs: by their mean cross spectrum, with coherence.
+    |X_i / X_(i-1)| of the displacements' spectra, at the frequencies that dominate the leader's motion.
 
 With delayed spacing follower n repeats everything n timesteps late. Its window is shifted by as many, and its errors
 count from timestep n + 1 on: before, its neighbour has not moved.
@@ -27,7 +26,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
 
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.json_values import JsonObject
@@ -44,8 +42,6 @@ LEAST_WINDOW = 8
 """Timesteps that a spectrum needs at least."""
 MOST_TURN_RAD = math.radians(3.0)
 """A leader that turns more in a timestep has no gains: followers' displacements have lever arms then."""
-LEAST_RUNS = 4
-"""Runs from which coherence says something; of one it is 1."""
 RESAMPLES = 2000
 
 
@@ -62,54 +58,28 @@ class Interval(NamedTuple):
         return self.low > 1.0
 
 
-class Transfer(NamedTuple):
-    """From the displacements of one robot to those of another, by frequency.
-
-    Attributes:
-        frequency: (k,) per timestep, from 0 to 0.5.
-        amplitude_m: (k,) root mean square over runs of the first robot's amplitudes.
-        gain: (k,) second to first robot.
-        coherence: (k,) from 0 to 1; None with fewer than `LEAST_RUNS` runs.
-    """
-
-    frequency: Array
-    amplitude_m: Array
-    gain: Array
-    coherence: Array | None
-
-    @property
-    def dominant(self) -> list[int]:
-        """Numbers of the frequencies that dominate the first robot's motion."""
-        power = self.amplitude_m**2
-        counted = (self.amplitude_m >= LEAST_AMPLITUDE_M) & (power >= LEAST_SHARE * power[1:].max(initial=0.0))
-        counted[0] = False
-        return [int(number) for number in np.flatnonzero(counted)]
-
-
-def transfer(first: Array, second: Array) -> Transfer:
-    """Estimate the transfer between two robots: windows by Hann, without their means, averaged over runs.
+def spectrum(moves: Array) -> NDArray[np.complex128]:
+    """Spectrum of displacements without their mean, by Hann's window.
 
     Args:
-        first: displacements along one axis, (runs, timesteps), metres.
-        second: those of the other robot.
+        moves: (timesteps, axes), metres.
 
-    Raises:
-        ValueError: if the arrays' shapes differ, or their windows are shorter than `LEAST_WINDOW`.
+    Returns:
+        Complex amplitudes at k / timesteps cycles per timestep, (timesteps // 2 + 1, axes), metres.
     """
-    if first.shape != second.shape or first.shape[-1] < LEAST_WINDOW:
-        raise ValueError(f"windows of the same shape with {LEAST_WINDOW} timesteps or more are needed")
-    pairs = {"11": (first, first), "12": (first, second), "22": (second, second)}
-    spectra = {
-        name: signal.csd(a, b, nperseg=first.shape[-1], scaling="spectrum")[1].mean(axis=0)
-        for name, (a, b) in pairs.items()
-    }
-    power, cross = np.real(spectra["11"]), np.abs(spectra["12"])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gain = cross / power
-        coherence = cross**2 / (power * np.real(spectra["22"]))
-    frequency = np.asarray(np.fft.rfftfreq(first.shape[-1]), dtype=np.float64)
-    known = coherence if len(first) >= LEAST_RUNS else None
-    return Transfer(frequency, np.sqrt(2.0 * power), gain, known)
+    count = len(moves)
+    window = 0.5 - 0.5 * np.cos(2.0 * math.pi * np.arange(count) / count)
+    found = np.fft.rfft(window[:, None] * (moves - moves.mean(axis=0)), axis=0) * 2.0 / window.sum()
+    if count % 2 == 0:
+        found[-1] /= 2.0  # the one frequency of which there is no mirror image
+    return np.asarray(found, dtype=np.complex128)
+
+
+def dominant(amplitudes_m: Array) -> list[int]:
+    """List the numbers of the frequencies that dominate a motion, by the amplitudes of one axis."""
+    power = amplitudes_m**2
+    counted = (amplitudes_m >= LEAST_AMPLITUDE_M) & (power >= LEAST_SHARE * power[1:].max(initial=0.0))
+    return [int(number) for number in np.flatnonzero(counted) if number]
 
 
 def windows(motions: Sequence[Array], delayed: bool) -> list[Array]:
@@ -205,24 +175,23 @@ def gains(motions: Sequence[Array]) -> list[JsonObject]:
         Of each frequency `axis`, `period` in timesteps, the leader's `amplitude_m`, `hops`, from each robot to the
         next, and `head_to_tail`, from the leader to the last one. Empty if the windows are too short.
     """
-    found: list[JsonObject] = []
-    if len(motions[0]) < LEAST_WINDOW:
-        return found
-    for number, axis in enumerate(("u", "v")):
-        columns = [motion[None, :, number] for motion in motions]
-        hops = [transfer(first, second) for first, second in pairwise(columns)]
-        whole = transfer(columns[0], columns[-1])
-        found += [
-            {
-                "axis": axis,
-                "period": 1.0 / float(whole.frequency[k]),
-                "amplitude_m": float(whole.amplitude_m[k]),
-                "hops": [_finite(hop.gain[k]) for hop in hops],
-                "head_to_tail": _finite(whole.gain[k]),
-            }
-            for k in whole.dominant
-        ]
-    return found
+    count = len(motions[0])
+    if count < LEAST_WINDOW:
+        return []
+    amplitudes = np.abs([spectrum(moves) for moves in motions])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        hops, whole = amplitudes[1:] / amplitudes[:-1], amplitudes[-1] / amplitudes[0]
+    return [
+        {
+            "axis": axis,
+            "period": count / k,
+            "amplitude_m": float(amplitudes[0, k, number]),
+            "hops": [_finite(gain) for gain in hops[:, k, number]],
+            "head_to_tail": _finite(whole[k, number]),
+        }
+        for number, axis in enumerate(("u", "v"))
+        for k in dominant(amplitudes[0, :, number])
+    ]
 
 
 def _finite(value: float) -> float | None:

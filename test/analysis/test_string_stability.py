@@ -14,8 +14,8 @@ from robot_formation.analysis.string_stability import (
     error_ratios,
     gains,
     geometric_mean,
+    spectrum,
     string_stability,
-    transfer,
     windows,
 )
 from robot_formation.geometry.se2 import Motion
@@ -79,25 +79,19 @@ def test_a_leader_with_even_steps_has_no_dominant_frequency() -> None:
 
 def test_short_runs_have_no_gains() -> None:
     assert gains(windows(chain(periodic(4, 10), 0.0, 1), delayed=False)) == []
-    with pytest.raises(ValueError, match="8 timesteps or more"):
-        transfer(np.ones((1, 7)), np.ones((1, 7)))
 
 
-@given(st.floats(0.2, 3.0), st.sampled_from([0.0, 0.01, 0.04]))
-def test_over_many_runs_noise_lowers_the_coherence_but_not_the_gain(factor: float, noise_m: float) -> None:
-    rng = np.random.default_rng(3)
-    first = rng.normal(0.0, 0.02, (2000, 16))
-    second = factor * first + rng.normal(0.0, noise_m, first.shape)
-    found = transfer(first, second)
-    coherence = 1.0 / (1.0 + (noise_m / (0.02 * factor)) ** 2)
-    assert found.coherence is not None
-    assert found.gain[2:-1] == pytest.approx(np.full(6, factor), abs=0.15 * factor + 5.0 * noise_m)
-    assert found.coherence[2:-1] == pytest.approx(np.full(6, coherence), abs=0.08)
-
-
-def test_few_runs_have_no_coherence() -> None:
-    first = np.random.default_rng(0).normal(size=(3, 16))
-    assert transfer(first, first).coherence is None
+@given(st.integers(4, 20), st.integers(1, 9), st.floats(0.001, 0.1), st.floats(-3.0, 3.0))
+def test_amplitudes_are_those_of_the_cosines(half: int, cycles: int, amplitude_m: float, phase: float) -> None:
+    count = 2 * half
+    cycles = 1 + cycles % (half - 1)
+    angles = 2.0 * math.pi * cycles * np.arange(count) / count
+    found = np.abs(spectrum(0.05 + amplitude_m * np.cos(angles + phase)[:, None]))[:, 0]
+    assert found[cycles] == pytest.approx(amplitude_m)
+    far = [k for k in range(2, half + 1) if abs(k - cycles) > 1]
+    assert found[far] == pytest.approx(np.zeros(len(far)), abs=1e-12)
+    ends = spectrum(amplitude_m * np.cos(math.pi * np.arange(count))[:, None])
+    assert abs(ends[-1, 0]) == pytest.approx(amplitude_m)
 
 
 def test_white_errors_grow_by_the_root_of_five_per_robot_with_persistence() -> None:
