@@ -319,7 +319,7 @@ def _draw_times(axes: Any, cases: dict[Case, list[Run]]) -> None:
                 ends, np.polyval(np.polyfit(numbers, times, 1), ends), color=colour, linestyle="--", label="linear"
             )
         elif schedule == "timer":
-            axes.plot(ends, [times.mean()] * 2, color=colour, linestyle="--", label="constant")
+            axes.plot([1, 10], [times.mean()] * 2, color=colour, linestyle="--", label="constant")
     axes.set_ylim(bottom=0.0)
     axes.set_xlim(0.5, 10.5)
     axes.set_xticks(range(1, 11))
