@@ -91,7 +91,7 @@ def motion_totals(record: RunRecord, follower: FollowerRecord) -> JsonObject:
     stamps = np.union1d(own.stamps_ns, neighbour.stamps_ns)
     errors = _errors_m(record, follower, own, neighbour, stamps)
     gaps = gaps_m(record, own.at(stamps), neighbour.at(stamps))
-    gaps = gaps[np.isfinite(gaps)]
+    errors, gaps = errors[np.isfinite(errors)], gaps[np.isfinite(gaps)]
     return {
         "formation_error_moving_max_m": float(errors.max()) if errors.size else None,
         "gap_min_m": float(gaps.min()) if gaps.size else None,
