@@ -1,13 +1,18 @@
-"""Formations of N followers by schedule and spacing: errors along the chain, and time per timestep.
+"""Formations of N followers by schedule and spacing: errors along the chain, string stability, and times.
 
-Each run is one number of followers, schedule, spacing, leader's path and seed, in process, camera on demand. The
-ground is a shallow bowl of 6 m (0.02 1/m). OUT/runs.csv grows row by row, one row per follower, and the same command
-goes on where it was stopped. `report` prints per case: medians over seeds of the formation error of the first, the
-middle and the last follower, the geometric mean of the ratio from one follower to the next with a 95 % bootstrap
-interval, simulated and processor time per timestep, and lost runs.
+Each run is one ground, leader's path, schedule, number of followers and seed, in process, camera on demand. Grounds:
+track_one and track_two are the presets (plate of 1.78 m, bowl of 0.2 1/m), flat_bowl is 2.6 m wide with 0.06 1/m,
+six_metres 6 m wide with 0.02 1/m. OUT/runs.csv grows run by run, one row per follower, and the same command goes on
+where it was stopped. A run that ended early counts as not done.
 
-    python bench/chain.py run OUT --followers 1,2,3,5,10 --seeds 0:5 [--schedules turns,timer+delayed]
+`report` prints Markdown tables: medians over seeds of the first, the middle and the last follower; ratios from one
+follower to the next as geometric means with 95 % bootstrap intervals over seeds, "unstable" where the interval lies
+above 1; gains at the leader's dominant frequencies; times. `figure` draws the errors along the longest chain of each
+schedule beside the theory for persistence, and the simulated time per timestep over N.
+
+    python bench/chain.py run OUT --followers 1,2,3,5,8,10 --seeds 0:5 [--schedules turns,timer+delayed]
     python bench/chain.py report OUT
+    python bench/chain.py figure OUT FILE.png [--path straight]
 """
 
 from __future__ import annotations
@@ -18,13 +23,12 @@ import math
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from robot_formation.analysis.quantities import analyse
+from chain_tables import LATE, Row, Task, cases_of, draw, errors_table, gains_table, stability_table, times_table
+from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, analyse
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
 from robot_formation.cli.sweep import seeds
@@ -32,155 +36,171 @@ from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
 from run_table import missing, open_table
 
-TIMESTEPS = 20
-PATHS: dict[str, tuple[str, ...]] = {
-    "straight": ("leader.path=straight",),
-    "slalom": ("leader.path=slalom", "leader.path_parameters=[step_m=0.03, period=20]"),
+COMMON = ("world.overhead.enabled=false", "world.camera.mode=on_demand")
+FLAT_BOWL = ("world.surface_parameters=[size_m=2.6, curvature_per_m=0.06]", "start_x_m=0.82", "start_y_m=0.9")
+SIX_METRES = ("world.surface_parameters=[size_m=6.0, curvature_per_m=0.02]", "start_x_m=1.4", "start_y_m=1.5")
+GROUNDS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "track_one": ("one", ()),
+    "track_two": ("two", ()),
+    "flat_bowl": ("one", FLAT_BOWL),
+    "six_metres": ("one", SIX_METRES),
 }
+"""Preset and settings by name."""
+PATHS: dict[str, tuple[str, ...]] = {
+    "straight": ("straight",),
+    "slalom": ("slalom", "step_m=0.03", "period=20"),
+    "speed_step": ("speed_step", "before=8"),
+    "stop": ("stop", "before=8", "standing=4"),
+    "chirp": ("chirp", "period=16", "last_period=4", "sweep=20"),
+    "pulse": ("pulse", "step_m=0.03", "period=12"),
+    "circle": ("circle", "period=12"),
+    "lemniscate": ("lemniscate",),
+    "random_walk": ("random_walk",),
+}
+"""The path's name, then its parameters."""
+CHAIN_PATHS = ("straight", "slalom", "speed_step", "stop", "chirp")
 SCHEDULES = ("turns", "wave", "together", "timer", "timer+delayed")
-GROUND = (
-    "world.surface_parameters=[size_m=6.0, curvature_per_m=0.02]",
-    "start_x_m=1.4",
-    "start_y_m=1.5",
-    "world.overhead.enabled=false",
-    "world.camera.mode=on_demand",
-    f"leader.timesteps={TIMESTEPS}",
-)
 
 
-class Task(NamedTuple):
-    """One run."""
-
-    path: str
-    schedule: str
-    followers: int
-    seed: int
+def timesteps(task: Task) -> int:
+    """Return how many a run has: 20, or 30 of a path that stays near its start on a small ground."""
+    return 20 if task.path == "straight" or task.ground == "six_metres" else 30
 
 
-@dataclass(frozen=True)
-class Row:
-    """A follower's part of a run; None where unavailable."""
-
-    path: str
-    schedule: str
-    followers: int
-    seed: int
-    follower: int
-    outcome: str
-    formation_error_rmse_m: float | None
-    leader_error_rmse_m: float | None
-    losses: int
-    movements_per_timestep: float | None
-    simulated_s: float
-    cpu_s: float
-
-    @property
-    def task(self) -> Task:
-        """The run that it is of."""
-        return Task(self.path, self.schedule, self.followers, self.seed)
-
-
-def build(task: Task) -> scenarios.Scenario:
-    """Make a run's scenario."""
+def build(task: Task, more: Sequence[str] = ()) -> scenarios.Scenario:
+    """Make a run's scenario, with more settings KEY=VALUE."""
+    track, ground = GROUNDS[task.ground]
+    path, *parameters = PATHS[task.path]
     schedule, _, spacing = task.schedule.partition("+")
     settings = [
-        *GROUND,
-        *PATHS[task.path],
+        *COMMON,
+        *ground,
+        f"leader.timesteps={timesteps(task)}",
+        f"leader.path={path}",
+        f"leader.path_parameters=[{', '.join(parameters)}]",
         f"followers={task.followers}",
         f"schedule={schedule}",
         f"spacing={spacing or 'rigid'}",
         f"seed={task.seed}",
+        *more,
     ]
-    return scenarios.override(scenarios.load_track("one"), settings)
+    return scenarios.override(scenarios.load_track(track), settings)
 
 
-def run_task(task: Task) -> list[Row]:
+def run_task(task: Task, more: Sequence[str] = ()) -> list[Row]:
     """Carry out one run."""
-    began = time.process_time()
-    found = analyse(run_in_memory(build(task)))
-    cpu_s = time.process_time() - began
+    scenario = build(task, more)
+    scenario.check()
+    cpu_s, wall_s = time.process_time(), time.perf_counter()
+    record = run_in_memory(scenario)
+    cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
+    return rows_of(task, analyse(record), cpu_s, wall_s)
+
+
+def rows_of(task: Task, run: RunAnalysis, cpu_s: float, wall_s: float) -> list[Row]:
+    """Return a run's rows, one per follower."""
+    chain = run.string_stability or {"hops": [], "gains": []}
+    hops = {hop["robot"]: hop for hop in chain["hops"]}
     return [
         Row(
             *task,
             follower=number,
-            outcome=found.outcome,
-            formation_error_rmse_m=follower.totals["formation_error_rmse_m"],
-            leader_error_rmse_m=follower.totals["leader_error_rmse_m"],
+            outcome=run.outcome,
+            timesteps=timesteps(task),
+            formation_error_late_rmse_m=late_rmse_m(follower),
+            error_ratio_l2=hops.get(follower.name, {}).get("error_ratio_l2"),
+            error_ratio_linf=hops.get(follower.name, {}).get("error_ratio_linf"),
+            gains=" ".join(
+                f"{gain['axis']}{gain['period']:.1f}={gain['hops'][number - 1]:.4f}"
+                for gain in chain["gains"]
+                if gain["hops"][number - 1]
+            ),
             losses=len(follower.totals["losses"]),
-            movements_per_timestep=follower.totals["movements_per_timestep"],
             simulated_s=float(follower.totals["simulated_seconds"]),
             cpu_s=cpu_s,
+            wall_s=wall_s,
+            **{name: follower.totals[name] for name in TOTALS},
         )
-        for number, follower in enumerate(found.followers, 1)
+        for number, follower in enumerate(run.followers, 1)
     ]
+
+
+TOTALS = (
+    "formation_error_rmse_m",
+    "formation_error_max_m",
+    "formation_error_moving_max_m",
+    "leader_error_rmse_m",
+    "gap_min_m",
+    "touches",
+    "movements_per_timestep",
+)
+"""Columns that are totals of the same names."""
+
+
+def late_rmse_m(follower: FollowerAnalysis) -> float | None:
+    """Root mean square formation error from timestep `LATE` on; None if it did not come so far."""
+    errors = [timestep.formation_error_m for timestep in follower.timesteps[LATE - 1 :]]
+    known = [error for error in errors if error is not None]
+    return math.sqrt(float(np.mean(np.square(known)))) if known else None
 
 
 def carry_out(args: argparse.Namespace) -> int:
     """Run what is missing in the table."""
     chosen = [
-        Task(path, schedule, followers, seed)
+        Task(ground, path, schedule, followers, seed)
         for seed in seeds(args.seeds)
-        for path, schedule, followers in itertools.product(args.paths, args.schedules, args.followers)
+        for ground, path, schedule, followers in itertools.product(
+            args.grounds, args.paths, args.schedules, args.followers
+        )
     ]
     table, tasks = missing(args.out, Row, chosen)
-    for rows in with_progress(run_parallel(run_task, ((task,) for task in tasks), args.jobs), len(tasks)):
+    for rows in with_progress(run_parallel(run_task, ((task, args.set) for task in tasks), args.jobs), len(tasks)):
         table.append(rows)
     return 0
 
 
-def ratio(runs: Sequence[Sequence[Row]]) -> str:
-    """Geometric mean of the ratio from one follower to the next, over runs that came to their end."""
-    logs = []
-    for rows in runs:
-        errors = [row.formation_error_rmse_m for row in rows]
-        if len(rows) > 1 and rows[0].outcome == "done" and errors[0] and errors[-1]:
-            logs.append(math.log(errors[-1] / errors[0]) / (len(rows) - 1))
-    if not logs:
-        return "-"
-    draws = np.random.default_rng(0).choice(logs, (2000, len(logs))).mean(axis=1)
-    low, high = np.exp(np.quantile(draws, [0.025, 0.975]))
-    return f"{math.exp(float(np.mean(logs))):.2f} ({low:.2f}..{high:.2f})"
-
-
 def report(args: argparse.Namespace) -> int:
-    """Print the table."""
-    grouped: dict[tuple[str, str, int], dict[int, list[Row]]] = {}
-    for row in open_table(args.out, Row).read():
-        case = grouped.setdefault((row.path, row.schedule, row.followers), {})
-        case.setdefault(row.seed, []).append(row)
-    print("| path | schedule | N | runs | not done | error of follower 1, middle, N, cm | ratio per robot | "
-          "simulated s | processor s |")  # fmt: skip
-    print("|---" * 9 + "|")
-    for (path, schedule, count), runs in sorted(grouped.items()):
-        done = [rows for rows in runs.values() if rows[0].outcome == "done"]
-        shown = []
-        for number in sorted({0, (count - 1) // 2, count - 1}):
-            errors = [100.0 * (rows[number].formation_error_rmse_m or math.inf) for rows in done]
-            shown.append(f"{np.median(errors):.2f}" if errors else "-")
-        times = [
-            f"{np.median([getattr(rows[0], name) for rows in done]) / TIMESTEPS:.2f}" if done else "-"
-            for name in ("simulated_s", "cpu_s")
-        ]
-        print(f"| {path} | {schedule} | {count} | {len(runs)} | {len(runs) - len(done)} | {', '.join(shown)} | "
-              f"{ratio(list(runs.values()))} | {times[0]} | {times[1]} |")  # fmt: skip
+    """Print the tables."""
+    cases = cases_of(open_table(args.out, Row).read())
+    for made in (errors_table, stability_table, gains_table, times_table):
+        print("\n".join(made(cases)))
     return 0
 
 
+def figure(args: argparse.Namespace) -> int:
+    """Draw the figure."""
+    print(draw(cases_of(open_table(args.out, Row).read()), args.ground, args.path, args.file))
+    return 0
+
+
+def names(text: str) -> list[str]:
+    """Read names separated by commas."""
+    return text.split(",")
+
+
 def main() -> int:
-    """Run or report."""
+    """Run, report or draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     verbs = parser.add_subparsers(required=True)
     runner = verbs.add_parser("run", help="carry out what is missing")
     runner.add_argument("out", type=Path)
     runner.add_argument("--seeds", default="0:5")
-    runner.add_argument("--followers", type=lambda text: [int(n) for n in text.split(",")], default=[1, 2, 3, 5, 10])
-    runner.add_argument("--schedules", type=lambda text: text.split(","), default=list(SCHEDULES))
-    runner.add_argument("--paths", type=lambda text: text.split(","), default=list(PATHS))
+    runner.add_argument("--followers", type=lambda text: [int(n) for n in text.split(",")], default=[1, 2, 3, 5, 8, 10])
+    runner.add_argument("--schedules", type=names, default=list(SCHEDULES))
+    runner.add_argument("--paths", type=names, default=list(CHAIN_PATHS))
+    runner.add_argument("--grounds", type=names, default=["six_metres"])
+    runner.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="in all runs of OUT")
     runner.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     runner.set_defaults(run=carry_out)
-    reporter = verbs.add_parser("report", help="print the table")
+    reporter = verbs.add_parser("report", help="print the tables")
     reporter.add_argument("out", type=Path)
     reporter.set_defaults(run=report)
+    drawer = verbs.add_parser("figure", help="draw errors along the chain and time per timestep")
+    drawer.add_argument("out", type=Path)
+    drawer.add_argument("file", type=Path)
+    drawer.add_argument("--ground", choices=GROUNDS, default="six_metres")
+    drawer.add_argument("--path", choices=PATHS, default="straight")
+    drawer.set_defaults(run=figure)
     args = parser.parse_args()
     found: int = args.run(args)
     return found

@@ -27,8 +27,11 @@ def pose(record: RunRecord, robot: str, stamp_ns: int) -> Motion | None:
     return track.at(stamp_ns) if track else None
 
 
-def pose_at_end(record: RunRecord, robot: str, timestep: int) -> Motion | None:
-    """Return a robot's true pose at the end of a timestep, if it is known; 0 and before: after the first alignment."""
+def end_ns(record: RunRecord, robot: str, timestep: int) -> int | None:
+    """Return the stamp of a timestep's end, if it is known; 0 and before: of the first alignment's.
+
+    A follower ends with its report, the leader with its move.
+    """
     track = record.tracks.get(robot)
     if track is None or not len(track.stamps_ns):
         return None
@@ -36,10 +39,15 @@ def pose_at_end(record: RunRecord, robot: str, timestep: int) -> Motion | None:
     if timestep <= 0:
         moves = moves_of_timestep(record, follower, 1) if follower is not None and follower.displacements else []
         aligned = follower is not None and moves and moves[0] > 0
-        start_ns = follower.moved[moves[0] - 1].stamp_ns if follower is not None and aligned else track.stamps_ns[0]
-        return track.at(int(start_ns))
+        return int(follower.moved[moves[0] - 1].stamp_ns if follower is not None and aligned else track.stamps_ns[0])
     ends = record.leader_moved if follower is None else follower.displacements
-    return track.at(ends[timestep - 1].stamp_ns) if timestep <= len(ends) else None
+    return ends[timestep - 1].stamp_ns if timestep <= len(ends) else None
+
+
+def pose_at_end(record: RunRecord, robot: str, timestep: int) -> Motion | None:
+    """Return a robot's true pose at the end of a timestep, if it is known; 0 and before: after the first alignment."""
+    stamp_ns = end_ns(record, robot, timestep)
+    return None if stamp_ns is None else record.tracks[robot].at(stamp_ns)
 
 
 def moves_of_timestep(record: RunRecord, follower: FollowerRecord, t: int) -> list[int]:

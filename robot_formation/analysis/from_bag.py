@@ -233,8 +233,9 @@ def _track(messages: Sequence[Message]) -> Track | None:
     stamps = np.array([_stamp_ns(message) for message in messages], dtype=np.int64)
     positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
     yaws = np.array([_yaw(pose.orientation) for pose in poses])
+    leans = np.array([_up(pose.orientation)[:2] for pose in poses])
     order = np.argsort(stamps, kind="stable")
-    return Track(stamps[order], positions[order], yaws[order])
+    return Track(stamps[order], positions[order], yaws[order], leans[order])
 
 
 def _overhead(
@@ -277,10 +278,14 @@ def _place(point: Message) -> tuple[float, float, float]:
 
 def _dot(pose: Message, height_m: float) -> tuple[float, float, float]:
     """Place of a robot's dot, which is on the z axis of its base_link."""
-    q = pose.orientation
     x, y, z = _place(pose.position)
-    up_x, up_y = 2.0 * (q.x * q.z + q.y * q.w), 2.0 * (q.y * q.z - q.x * q.w)
-    return (x + height_m * up_x, y + height_m * up_y, z + height_m * (1.0 - 2.0 * (q.x * q.x + q.y * q.y)))
+    up_x, up_y, up_z = _up(pose.orientation)
+    return (x + height_m * up_x, y + height_m * up_y, z + height_m * up_z)
+
+
+def _up(q: Message) -> tuple[float, float, float]:
+    """Direction of the z axis of a body of this orientation, a unit vector."""
+    return 2.0 * (q.x * q.z + q.y * q.w), 2.0 * (q.y * q.z - q.x * q.w), 1.0 - 2.0 * (q.x * q.x + q.y * q.y)
 
 
 def _ground(marker: Message) -> Ground | None:

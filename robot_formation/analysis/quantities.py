@@ -37,9 +37,11 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.chain import chain_totals, moves_of_timestep, pose, pose_at_end
 from robot_formation.analysis.errors import AnalysisError
+from robot_formation.analysis.in_motion import motion_totals
 from robot_formation.analysis.moves import Moves, is_blind, move_totals, movements_of, moves_of
 from robot_formation.analysis.quantiles import ELLIPSE_90, NORMAL_90
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
+from robot_formation.analysis.string_stability import string_stability
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.json_values import JsonObject
 from robot_formation.names import beacon_neighbour
@@ -119,17 +121,22 @@ class FollowerAnalysis:
 
 @dataclass(frozen=True)
 class RunAnalysis:
-    """A run's scenario, outcome (done, lost, left_plate or incomplete) and followers."""
+    """A run's scenario, outcome (done, lost, left_plate or incomplete) and followers.
+
+    `string_stability` is None with one follower.
+    """
 
     scenario: str | None
     outcome: str
     followers: tuple[FollowerAnalysis, ...]
+    string_stability: JsonObject | None = None
 
     def to_json(self) -> JsonObject:
-        """Return the command line's JSON: the first follower's, and each one's where there are several."""
+        """Return the command line's JSON: the first follower's, and what there is more where there are several."""
         result = {"scenario": self.scenario, "outcome": self.outcome, **self.followers[0].to_json()}
         if len(self.followers) > 1:
             result["followers"] = {follower.name: follower.to_json() for follower in self.followers}
+            result["string_stability"] = self.string_stability
         return result
 
 
@@ -142,7 +149,9 @@ def analyse(record: RunRecord) -> RunAnalysis:
     if not record.followers:
         raise AnalysisError("the run has no follower; give the record of a formation run")
     followers = tuple(analyse_follower(record, follower) for follower in record.followers)
-    return RunAnalysis(record.details.get("scenario"), _outcome(record, followers), followers)
+    errors_m = [[timestep.formation_error_m for timestep in follower.timesteps] for follower in followers]
+    chain = string_stability(record, errors_m)
+    return RunAnalysis(record.details.get("scenario"), _outcome(record, followers), followers, chain)
 
 
 def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAnalysis:
@@ -186,6 +195,7 @@ def analyse_follower(record: RunRecord, follower: FollowerRecord) -> FollowerAna
     values["path_length_m"] = {robot: track.length_m for robot, track in record.tracks.items()}
     values["overhead_error_m"] = overhead_errors(record)
     values["simulated_seconds"] = record.simulated_s
+    values.update(motion_totals(record, follower))
     return FollowerAnalysis(follower.name, follower.lost, timesteps, unfinished, values)
 
 

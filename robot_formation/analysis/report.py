@@ -43,6 +43,9 @@ def text_report(record: RunRecord, analysis: RunAnalysis) -> str:
             sections.append(follower.name.replace("_", " "))
         sections.append("\n".join(_table(follower)))
         sections.append("\n".join(_totals(follower)))
+    if analysis.string_stability is not None:
+        sections.append("
+".join(["along the chain", *_along_the_chain(analysis.string_stability)]))
     sections.append(f"outcome: {analysis.outcome}{_who_is_lost(analysis)}")
     return "\n\n".join(sections)
 
@@ -127,6 +130,7 @@ def _totals(follower: FollowerAnalysis) -> list[str]:
         *_lost(values),
         *_losses(values),
         ("formation error", _formation_error(values)),
+        *_at_worst(values),
         ("heading error", f"RMSE {_scaled(values['heading_error_rmse_rad'], math.degrees(1.0))} deg"),
         ("path", ", ".join(f"{robot} {length:.3f} m" for robot, length in values["path_length_m"].items()) or _NONE),
         *_overhead_error(values),
@@ -190,6 +194,38 @@ def _formation_error(values: JsonObject) -> str:
     keys = ("rmse_m", "bias_u_m", "bias_v_m", "scatter_m")
     rmse, bias_u, bias_v, scatter = (_scaled(values[f"formation_error_{key}"], 100.0) for key in keys)
     return f"RMSE {rmse} cm (bias u {bias_u}, v {bias_v}; scatter {scatter})"
+
+
+def _at_worst(values: JsonObject) -> list[tuple[str, str]]:
+    if values["formation_error_moving_max_m"] is None or values["gap_min_m"] is None:
+        return []
+    end, moving, gap = (
+        _scaled(values[key], 100.0) for key in ("formation_error_max_m", "formation_error_moving_max_m", "gap_min_m")
+    )
+    touched = f", touches {values['touches']}" if values["touches"] else ""
+    return [
+        ("  largest", f"at ends of timesteps {end} cm, in motion {moving} cm"),
+        ("gap to the neighbour's body", f"at least {gap} cm{touched}"),
+    ]
+
+
+def _along_the_chain(values: JsonObject) -> list[str]:
+    """List ratios from each robot to the next; one column per follower, from the second on where errors are meant."""
+    hops = values["hops"]
+    rows = [
+        (f"error to that of the one before, {name}", ["", *(_scaled(hop[key], 1.0) for hop in hops)])
+        for name, key in (("RMS", "error_ratio_l2"), ("max", "error_ratio_linf"))
+    ]
+    rows += [
+        (f"gain along {found['axis']}, period {found['period']:.1f}", [_scaled(gain, 1.0) for gain in found["hops"]])
+        for found in values["gains"]
+    ]
+    width = max(len(name) for name, _ in rows)
+    numbers = [str(number) for number in range(1, len(hops) + 2)]
+    return [
+        "".join([name.ljust(width), *(cell.rjust(6) for cell in cells)])
+        for name, cells in [("follower", numbers), *rows]
+    ]
 
 
 def _overhead_error(values: JsonObject) -> list[tuple[str, str]]:

@@ -45,11 +45,13 @@ class Track:
         stamps_ns: (n,) nanoseconds.
         positions_m: (n, 3) x, y, z.
         yaws_rad: (n,) heading, anticlockwise from world x.
+        leans: (n, 2) x and y of base_link's z axis, a unit vector; None: upright.
     """
 
     stamps_ns: NDArray[np.int64]
     positions_m: NDArray[np.float64]
     yaws_rad: NDArray[np.float64]
+    leans: NDArray[np.float64] | None = None
 
     def at(self, stamp_ns: int) -> Motion | None:
         """Return the last pose at or before the stamp in the world's plane, if there is any."""
@@ -155,11 +157,15 @@ class RunRecord:
     @property
     def dot_height_m(self) -> float:
         """Height of the reference dot above base_link, metres: what the run says, else the paper's robot's."""
+        return self.world_number("marker.top_m", DOT_HEIGHT_M)
+
+    def world_number(self, name: str, default: float) -> float:
+        """Return a parameter of the run's world; the default where it says none, or no finite number above 0."""
         try:
-            said = float(node_parameters(self.details)["world"]["marker.top_m"])
+            said = float(node_parameters(self.details)["world"][name])
         except (KeyError, ValueError, TypeError, OverflowError):
-            return DOT_HEIGHT_M
-        return said if math.isfinite(said) else DOT_HEIGHT_M
+            return default
+        return said if math.isfinite(said) and said > 0.0 else default
 
     @property
     def formation_distance_m(self) -> float:

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from robot_formation.geometry.se2 import Motion
+
+Array = NDArray[np.float64]
+N = TypeVar("N", float, Array)
 
 
 def footprint_gap_m(other: Motion, length_m: float, width_m: float) -> float:
@@ -18,11 +25,42 @@ def footprint_gap_m(other: Motion, length_m: float, width_m: float) -> float:
         length_m: length of both.
         width_m: width of both.
     """
-    half_length, half_width = 0.5 * length_m, 0.5 * width_m
     cosine, sine = math.cos(other.yaw_rad), math.sin(other.yaw_rad)
-    gaps = []
-    for x, y in ((1.0, 0.0), (0.0, 1.0), (cosine, sine), (-sine, cosine)):
-        own = abs(x) * half_length + abs(y) * half_width
-        others = abs(x * cosine + y * sine) * half_length + abs(y * cosine - x * sine) * half_width
-        gaps.append(abs(x * other.x_m + y * other.y_m) - own - others)
-    return max(gaps)
+    return max(_separations(other.x_m, other.y_m, cosine, sine, length_m, width_m))
+
+
+def footprint_gaps_m(own: Array, others: Array, length_m: float, width_m: float) -> Array:
+    """Gaps (n,) of pairs of equal rectangles as `footprint_gap_m` has them, metres.
+
+    Args:
+        own: centres x, y [m] and headings [rad] of the first ones in any frame, (n, 3).
+        others: those of the second ones.
+        length_m: length of all.
+        width_m: width of all.
+    """
+    x, y = others[:, 0] - own[:, 0], others[:, 1] - own[:, 1]
+    ahead, left = np.cos(own[:, 2]), np.sin(own[:, 2])
+    turn = others[:, 2] - own[:, 2]
+    inside = (ahead * x + left * y, ahead * y - left * x)
+    return np.asarray(np.max(_separations(*inside, np.cos(turn), np.sin(turn), length_m, width_m), axis=0))
+
+
+def _separations(x: N, y: N, cosine: N, sine: N, length_m: float, width_m: float) -> list[N]:
+    """Gaps along the normals of the four sides; the second rectangle's place and heading are in the first one's frame.
+
+    Args:
+        x: ahead of the first one.
+        y: to its left.
+        cosine: of the second one's heading.
+        sine: of the same.
+        length_m: length of both.
+        width_m: width of both.
+    """
+    half_length, half_width = 0.5 * length_m, 0.5 * width_m
+    gaps: list[N] = []
+    normals: tuple[tuple[Any, Any], ...] = ((1.0, 0.0), (0.0, 1.0), (cosine, sine), (-sine, cosine))
+    for ahead, left in normals:
+        own = abs(ahead) * half_length + abs(left) * half_width
+        others = abs(ahead * cosine + left * sine) * half_length + abs(left * cosine - ahead * sine) * half_width
+        gaps.append(abs(ahead * x + left * y) - own - others)
+    return gaps

@@ -139,7 +139,8 @@ def test_without_a_plan_an_unfinished_timestep_makes_a_run_incomplete(tmp_path: 
 
 def test_several_followers_are_measured_against_their_own_neighbours(tmp_path: Path) -> None:
     result = analysed(tmp_path, followers=3).to_json()
-    assert list(result) == ["scenario", "outcome", "timesteps", "totals", "followers"]
+    assert list(result) == ["scenario", "outcome", "timesteps", "totals", "followers", "string_stability"]
+    assert [hop["robot"] for hop in result["string_stability"]["hops"]] == ["follower_2", "follower_3"]
     assert list(result["followers"]) == ["follower_1", "follower_2", "follower_3"]
     assert result["followers"]["follower_1"] == {key: result[key] for key in ("timesteps", "totals")}
     # Every follower has the same error in the leader's frame: straight behind one another the second one has none,

@@ -66,6 +66,12 @@ def test_several_followers_have_a_section_each(tmp_path: Path) -> None:
     report = text_report(record, analyse(record))
     assert report.index("\nfollower 1\n") < report.index("\nfollower 2\n")
     assert report.count("timesteps finished") == 2
+    lines = report.splitlines()
+    chain = lines[lines.index("along the chain") + 1 :]
+    assert chain[0].split() == ["follower", "1", "2"]
+    first, second = (found.totals["formation_error_rmse_m"] for found in analyse(record).followers)
+    assert chain[1].split()[-1] == f"{second / first:.2f}"
+    assert max(map(len, lines)) <= 100
 
 
 def test_the_verb_prints_the_table_and_draws_pictures_beside_the_bag(

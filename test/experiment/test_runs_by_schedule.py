@@ -88,6 +88,17 @@ def test_delayed_places_lag_by_a_step_per_robot() -> None:
     assert np.allclose(np.diff(ends), -0.05, atol=0.02)
 
 
+@pytest.mark.parametrize("settings", [("schedule=turns",), ("schedule=timer", "spacing=delayed")])
+def test_a_formation_closes_up_while_its_leader_stands(settings: tuple[str, ...]) -> None:
+    """Steps of no length are timesteps like others; who lags behind arrives meanwhile."""
+    stop = ("leader.path=stop", "leader.path_parameters=[before=4, standing=4]", "leader.timesteps=8")
+    found = record(*settings, *stop)
+    assert [move.motion.x_m > 0.03 for move in found.leader_moved] == [True] * 4 + [False] * 4
+    assert [len(follower.displacements) for follower in found.followers] == [8, 8]
+    ends = [found.tracks[robot].positions_m[-1, 1] for robot in ("leader", "follower_1", "follower_2")]
+    assert np.allclose(ends, ends[0], atol=0.02)
+
+
 @pytest.mark.parametrize(
     "settings",
     [
@@ -99,6 +110,14 @@ def test_delayed_places_lag_by_a_step_per_robot() -> None:
 def test_ticks_and_frames_may_be_early_late_or_few(settings: tuple[str, ...]) -> None:
     found = analysed("followers=1", *settings)
     assert found.followers[0].totals["timesteps_finished"] == 6
+
+
+def test_who_waits_for_its_neighbours_step_is_behind_meanwhile() -> None:
+    turns, timer = (analysed(f"schedule={name}").followers[0].totals for name in ("turns", "timer"))
+    assert turns["formation_error_moving_max_m"] > 0.045
+    assert timer["formation_error_moving_max_m"] < turns["formation_error_moving_max_m"]
+    assert turns["gap_min_m"] > 0.03
+    assert turns["touches"] == timer["touches"] == 0
 
 
 def test_a_blind_follower_of_delayed_places_drives_on() -> None:

@@ -3,11 +3,12 @@
 import math
 
 import cv2
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_formation.geometry.footprint import footprint_gap_m
+from robot_formation.geometry.footprint import footprint_gap_m, footprint_gaps_m
 from robot_formation.geometry.se2 import Motion
 
 LENGTH_M, WIDTH_M = 0.365, 0.238
@@ -41,3 +42,11 @@ def test_the_gap_is_the_same_from_both_sides(x_m: float, y_m: float, yaw_rad: fl
 def test_side_by_side_the_gap_is_the_distance_less_a_width() -> None:
     assert footprint_gap_m(Motion(0.0, 0.32), LENGTH_M, WIDTH_M) == pytest.approx(0.32 - WIDTH_M)
     assert footprint_gap_m(Motion(0.5, 0.0), LENGTH_M, WIDTH_M) == pytest.approx(0.5 - LENGTH_M)
+
+
+@given(st.lists(st.tuples(places, places, angles, places, places, angles), min_size=1, max_size=5))
+def test_gaps_of_many_pairs_are_those_of_each(pairs: list[tuple[float, ...]]) -> None:
+    poses = np.array(pairs)
+    found = footprint_gaps_m(poses[:, :3], poses[:, 3:], LENGTH_M, WIDTH_M)
+    single = [footprint_gap_m(Motion(*pair[3:]).relative_to(Motion(*pair[:3])), LENGTH_M, WIDTH_M) for pair in pairs]
+    assert found == pytest.approx(single, abs=1e-12)

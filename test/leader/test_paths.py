@@ -47,7 +47,9 @@ def test_a_path_is_a_pure_function_of_timestep_and_seed(name: str) -> None:
     assert all(step.finite for step in forward)
 
 
-@pytest.mark.parametrize("name", ["circle", "slalom", "pulse", "lemniscate", "lissajous", "stadium", "random_walk"])
+@pytest.mark.parametrize(
+    "name", ["circle", "slalom", "pulse", "chirp", "lemniscate", "lissajous", "stadium", "random_walk"]
+)
 def test_another_seed_gives_another_phase_and_a_given_phase_stays(name: str) -> None:
     assert path(name, given=Given(seed=1)).motion(1) != path(name, given=Given(seed=2)).motion(1)
     if name != "random_walk":
@@ -55,7 +57,13 @@ def test_another_seed_gives_another_phase_and_a_given_phase_stays(name: str) -> 
         assert first.motion(1) == path(name, "phase=0.3", given=Given(seed=2)).motion(1)
 
 
-@pytest.mark.parametrize("name", ["straight", "circle", "arc", "slalom", "pulse", "stadium", "clothoid", "random_walk"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("straight", "circle", "arc", "slalom", "pulse", "speed_step", "stop", "chirp"),
+        *("stadium", "clothoid", "random_walk"),
+    ],
+)
 def test_the_leaders_step_is_the_default_of_a_paths_own(name: str) -> None:
     made = path(name, given=Given(step_m=0.03, seed=5))
     assert [made.motion(t) for t in (1, 2)] == [path(name, "step_m=0.03").motion(t) for t in (1, 2)]
@@ -184,6 +192,37 @@ def test_a_pulse_varies_its_step_by_a_cosine_around_the_mean(period: int, phase:
     assert sum(step.x_m for step in steps) == pytest.approx(0.05 * period)
     assert steps[0].x_m == pytest.approx(0.05 + 0.02 * math.cos(2.0 * math.pi * phase))
     assert {(step.y_m, step.yaw_rad) for step in steps} == {(0.0, 0.0)}
+
+
+def test_a_speed_step_changes_the_steps_once() -> None:
+    made = path("speed_step", "before=3", "amplitude_m=0.02", "step_m=0.04")
+    assert lengths(made, 6) == pytest.approx([0.04] * 3 + [0.06] * 3)
+    assert close_to(ends(made, 6), 0.3, 0.0, 0.0)
+
+
+def test_a_stop_is_a_stand_between_equal_steps() -> None:
+    made = path("stop", "before=2", "standing=3")
+    assert [made.motion(timestep) for timestep in range(1, 8)] == [Motion(0.05)] * 2 + [Motion()] * 3 + [
+        Motion(0.05)
+    ] * 2
+
+
+@given(periods, periods, st.integers(1, 60), phases)
+def test_a_chirps_frequency_changes_evenly_and_then_stays(first: int, last: int, sweep: int, phase: float) -> None:
+    texts = (f"period={first}", f"last_period={last}", f"sweep={sweep}", f"phase={phase}")
+    made = path("chirp", *texts, "step_m=0.05", "amplitude_m=0.02")
+    turns, frequency = phase, 1.0 / first
+    for timestep in range(1, sweep + 20):
+        assert made.motion(timestep).x_m == pytest.approx(0.05 + 0.02 * math.cos(2.0 * math.pi * turns), abs=1e-9)
+        # The mean frequency of a timestep is that of its middle.
+        slope = (1.0 / last - 1.0 / first) / sweep if timestep <= sweep else 0.0
+        turns += frequency + 0.5 * slope
+        frequency += slope
+
+
+def test_a_chirp_of_one_period_is_a_pulse() -> None:
+    chirp, pulse = path("chirp", "period=9", "last_period=9", "phase=0.2"), path("pulse", "period=9", "phase=0.2")
+    assert lengths(chirp, 50) == pytest.approx(lengths(pulse, 50))
 
 
 @given(st.integers(8, 80), phases, st.sampled_from(["kept", "along"]))

@@ -19,6 +19,7 @@ from robot_formation.leader.paths.clothoid import Clothoid
 from robot_formation.leader.paths.figures import Lemniscate, Lissajous
 from robot_formation.leader.paths.outside import outside_path
 from robot_formation.leader.paths.random_walk import RandomWalk
+from robot_formation.leader.paths.speeds import Chirp, SpeedStep, Stop
 from robot_formation.leader.paths.stadium import Stadium
 from robot_formation.leader.paths.straight import Straight
 from robot_formation.leader.paths.switch import Switch
@@ -41,7 +42,7 @@ __all__ = [
 ]
 
 _KINDS: tuple[type[PathKind], ...] = (
-    *(Straight, Circle, Arc, Slalom, Pulse, Lemniscate, Lissajous, Stadium, Clothoid),
+    *(Straight, Circle, Arc, Slalom, Pulse, SpeedStep, Stop, Chirp, Lemniscate, Lissajous, Stadium, Clothoid),
     *(Switch, RandomWalk, Waypoints, Teleop),
 )
 
