@@ -19,9 +19,10 @@ from robot_formation.cli import (
     sweep,
     teach,
     test,
+    view,
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, path, predict, record, play, info, recover, replay),
+    *(run, sweep, list_, analyze, view, path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )
