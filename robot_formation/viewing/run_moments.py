@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +20,7 @@ from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import Message
 from robot_formation.viewing.lens import Lens, read_lens
-from robot_formation.viewing.moment import FollowerNow, Forecast, Moment, RobotPose, TimestepFigures
+from robot_formation.viewing.moment import FollowerNow, Forecast, Moment, RobotPose, TimestepFigures, finite_angles
 from robot_formation.viewing.robot_shape import Link, read_shape
 from robot_formation.viewing.true_poses import TruePoses
 
@@ -182,11 +181,6 @@ class _Joints:
         except Exception as error:  # rosbags' decoders have no common error
             raise BagError(f"'{self._topic}' holds a message that can't be read: {error}") from error
         return finite_angles(message.name, message.position)
-
-
-def finite_angles(joints: Iterable[str], positions: Iterable[float]) -> dict[str, float]:
-    """Return the angles that are numbers, by joint."""
-    return {joint: float(angle) for joint, angle in zip(joints, positions, strict=False) if math.isfinite(angle)}
 
 
 def _count(stamps_ns: Sequence[int], until_ns: int) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -78,10 +79,7 @@ def make_page(bag: FormationBag, run: RunMoments, warn: Callable[[str], None]) -
         "SCENE": html.escape(_scene(run, shown, scale)),
         "DATA": told,
     }
-    page = PAGE
-    for name, text in parts.items():
-        page = page.replace(f"@{name}@", text, 1)
-    return page
+    return re.sub("@([A-Z]+)@", lambda match: parts[match[1]], PAGE)
 
 
 def _scene(run: RunMoments, shown: dict[str, list[tuple[int, Picture]]], scale: float) -> str:
