@@ -66,9 +66,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "--camera", metavar="MODE", help="stream (every frame, default) or on_demand (requested frames)"
     )
     parser.add_argument("--view", action="store_true", help="show the run in 3-D in a browser of this machine")
-    parser.add_argument(
-        "--view-port", metavar="N", type=port, help="port of --view (default: 8080; 0: any free one)"
-    )
+    parser.add_argument("--view-port", metavar="N", type=port, help="port of --view (default: 8080; 0: any free one)")
     parser.add_argument("--in-process", action="store_true", help="the same run in one process, without ROS middleware")
     parser.add_argument(
         "--json", action="store_true", help="print JSON and nothing else on standard output; no pictures"
@@ -155,7 +153,9 @@ def check_view(args: argparse.Namespace) -> None:
     """
     if args.view:
         if args.in_process:
-            raise FormationError("--view shows the node graph; leave --in-process out, or see 'formation view BAG' later")
+            raise FormationError(
+                "--view shows the node graph; leave --in-process out, or see 'formation view BAG' later"
+            )
         from robot_formation.viewing.browser import DEFAULT_PORT, check_viewer
 
         args.view_port = check_viewer(DEFAULT_PORT if args.view_port is None else args.view_port)

@@ -11,9 +11,9 @@ from robot_formation.cli.option_types import port
 from robot_formation.cli.parser import Subparsers
 
 DESCRIPTION = """\
-Show a run's bag in a browser of this machine: ground, robots, what the follower's camera saw, its place in formation and
-its forecast, with pause, steps, speed and time. Ctrl-C ends it. With --html it writes a page instead that needs neither
-this program nor a network.
+Show a run's bag in a browser of this machine: ground, robots, what the follower's camera saw, its place in formation
+and its forecast, with pause, steps, speed and time. Ctrl-C ends it. With --html it writes a page instead that needs
+neither this program nor a network.
 """
 
 
@@ -22,11 +22,12 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("view", help="a run's bag in 3-D in a browser", description=DESCRIPTION)
     parser.add_argument("bag", metavar="BAG", type=Path, help="bag of a run: a folder, an .mcap or a .db3 file")
     parser.add_argument(
-        "--html", metavar="FILE", type=Path, help="write one self-contained page there and end; an older one is replaced"
+        "--html",
+        metavar="FILE",
+        type=Path,
+        help="write one self-contained page there and end; an older one is replaced",
     )
-    parser.add_argument(
-        "--port", metavar="N", type=port, help="port on 127.0.0.1 (default: 8080; 0: any free one)"
-    )
+    parser.add_argument("--port", metavar="N", type=port, help="port on 127.0.0.1 (default: 8080; 0: any free one)")
     parser.add_argument(
         "--namespace", metavar="NS", help="the formation's namespace, where the bag holds several formations"
     )

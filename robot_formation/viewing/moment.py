@@ -78,8 +78,8 @@ class Forecast:
         circle = np.column_stack([np.cos(angles), np.sin(angles)])
         local = (circle * np.sqrt(ELLIPSE_90 * np.maximum(values, 0.0))) @ axes.T
         cosine, sine = math.cos(self.start.yaw_rad), math.sin(self.start.yaw_rad)
-        turned: NDArray[np.float64] = local @ np.array([[cosine, sine], [-sine, cosine]])
-        return turned + (self.end.x_m, self.end.y_m)
+        turned = local @ np.array([[cosine, sine], [-sine, cosine]])
+        return np.asarray(turned + np.array((self.end.x_m, self.end.y_m)), float)
 
 
 @dataclass(frozen=True)

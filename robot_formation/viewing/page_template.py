@@ -71,7 +71,8 @@ function goTo(second) {
   const input = inScene("input");
   if (!input) return;
   const view = scene.contentWindow;
-  Object.getOwnPropertyDescriptor(view.HTMLInputElement.prototype, "value").set.call(input, String(second / data.scale));
+  const { set } = Object.getOwnPropertyDescriptor(view.HTMLInputElement.prototype, "value");
+  set.call(input, String(second / data.scale));
   input.dispatchEvent(new view.Event("input", { bubbles: true }));
 }
 function last(rows, second) {
@@ -122,7 +123,8 @@ function draw(finished) {
     if (count <= 60) for (const row of done)
       text += `<circle cx="${x(row[0])}" cy="${y(row[column])}" r="2.5" fill="${colour}"/>`;
   }
-  if (finished) text += `<line x1="${x(finished)}" x2="${x(finished)}" y1="10" y2="160" stroke="#444" stroke-dasharray="3 3"/>`;
+  const now = x(finished);
+  if (finished) text += `<line x1="${now}" x2="${now}" y1="10" y2="160" stroke="#444" stroke-dasharray="3 3"/>`;
   text += `<text x="182" y="188" text-anchor="middle">timestep</text>`;
   element("plot").innerHTML = text;
 }

@@ -77,7 +77,7 @@ class Stage:
         for number, (_, segments) in enumerate(contours):
             share = number / max(1, len(contours) - 1)
             rgb = np.rint(_LOW_RGB + share * (_HIGH_RGB - _LOW_RGB)).astype(np.uint8)
-            lifted = segments + (0.0, 0.0, _LIFT_M)
+            lifted = segments + np.array((0.0, 0.0, _LIFT_M))
             self._scene.add_line_segments(f"/ground/contour_{number}", lifted, rgb, thickness=0.5 * _LINE_M)
         self.look_at(ground.vertices_m)
 
@@ -130,7 +130,7 @@ class Stage:
     def path(self, robot: str, points_m: NDArray[np.float64]) -> None:
         """Draw the way (n, 3) that a robot's base_link takes."""
         if len(points_m) > 1:
-            lifted = points_m + (0.0, 0.0, _LIFT_M)
+            lifted = points_m + np.array((0.0, 0.0, _LIFT_M))
             self._segments(f"/paths/{robot}", np.stack([lifted[:-1], lifted[1:]], axis=1), robot_rgb(robot))
 
     def picture(self, robot: str, picture: Picture) -> None:

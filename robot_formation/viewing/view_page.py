@@ -50,7 +50,9 @@ def write_page(path: Path, bag: FormationBag, run: RunMoments, warn: Callable[[s
     """
     text = make_page(bag, run, warn).encode("utf-8")
     if len(text) > MOST_BYTES:
-        raise ViewError(f"the page would have {len(text) / 1e6:.1f} MB, more than {MOST_BYTES / 1e6:g} MB; nothing was written")
+        raise ViewError(
+            f"the page would have {len(text) / 1e6:.1f} MB, more than {MOST_BYTES / 1e6:g} MB; nothing was written"
+        )
     try:
         path.write_bytes(text)
     except OSError as error:

@@ -118,7 +118,9 @@ class ViewerExecutable:
         for topic in [*self._moments.latest(), *self._moments.pictures()]:
             kind = conversions.message_class(topic.type)
             # As it came: most messages are replaced before anybody looks at them.
-            self._node.create_subscription(kind, topic.name, partial(self._latest.__setitem__, topic), _LATEST, raw=True)
+            self._node.create_subscription(
+                kind, topic.name, partial(self._latest.__setitem__, topic), _LATEST, raw=True
+            )
 
     def _subscribe(self, topic: Topic, take: Callable[[Message], None]) -> None:
         kind = conversions.message_class(topic.type)
