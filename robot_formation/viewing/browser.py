@@ -66,9 +66,8 @@ def view_server(port: int, title: str) -> Iterator[Any]:
         if port and server.get_port() != port:  # it takes the next one if another process was faster
             raise ViewError(f"port {port} of {HOST} can't be used (taken a moment ago); choose another one")
         # The button would send the page over a server on the internet.
-        server.gui.configure_theme(
-            show_logo=False, show_share_button=False, control_layout="collapsible", control_width="large"
-        )
+        server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        server.gui.main_panel.dock_right()
         yield server
     finally:
         with _quiet():

@@ -48,8 +48,8 @@ button, select { font: inherit; padding: .15rem .6rem; }
 <small id="rendered" hidden>The bag holds no pictures: these are rendered from ground truth.</small>
 <h2><span class="error">formation error</span> and <span class="correction">correction</span> (cm) by timestep</h2>
 <svg id="plot" viewBox="0 0 340 190" role="img" aria-label="formation error and correction by timestep"></svg>
-<p><small>Rings are places in formation. Black lines are forecasts of the next displacement with their 90 % ellipses.
-Lines on the ground are contour lines. Drag to turn the view, scroll to come closer.</small></p>
+<p><small>A rectangle on the ground is a robot's place in formation. Black lines over a robot are the forecast of its
+next displacement with its 90 % ellipse. Drag to turn the view, scroll to come closer.</small></p>
 </main>
 <script type="application/json" id="data">@DATA@</script>
 <script>

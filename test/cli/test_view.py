@@ -49,9 +49,7 @@ def test_a_missing_viser_is_said_with_what_installs_it(
 
 
 @pytest.mark.parametrize("words", [["view", str(SAMPLE), "--port"], ["run", "--view", "--view-port"]])
-def test_a_port_that_is_taken_or_none_is_said(
-    words: list[str], taken: int, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_port_that_is_taken_or_none_is_said(words: list[str], taken: int, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("viser", reason="viser is not installed (extra 'view')")
     assert f"port {taken} of 127.0.0.1 can't be used (Address already in use)" in complaint(capsys, *words, str(taken))
     assert "'70000' is not a port" in complaint(capsys, *words, "70000")

@@ -1,7 +1,8 @@
 """What viewers show of a run: the same from its bag and from its messages as they come."""
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from repository import ROOT
 from robot_formation import conversions, names
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
-from robot_formation.bag.reader import read_bag
+from robot_formation.bag.reader import BagMessage, read_bag
 from robot_formation.viewing.live_moments import LiveMoments
 from robot_formation.viewing.run_moments import RunMoments
 
@@ -43,7 +44,7 @@ def test_at_the_end_of_each_timestep_the_place_is_the_formation_error_away(run: 
 
 def test_a_forecast_begins_where_the_follower_stands_and_ends_near_where_it_will(run: RunMoments) -> None:
     ends = [d.stamp_ns for d in run.record.followers[0].displacements]
-    for before, after in zip(ends[5:], ends[6:], strict=False):
+    for before, after in itertools.pairwise(ends[5:]):
         forecast = run.at(before).followers[FOLLOWER].forecast
         assert forecast is not None
         stood, stands = (run.record.tracks[FOLLOWER].at(stamp) for stamp in (before, after))
@@ -115,10 +116,12 @@ class WithoutTruth(FormationBag):
     def topics(self) -> dict[str, str]:
         return {name: kind for name, kind in super().topics.items() if "ground_truth" not in name}
 
-    def messages(self, topics, start_ns=None, stop_ns=None):  # type: ignore[no-untyped-def]
+    def messages(
+        self, topics: Collection[str], start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[BagMessage]:
         return super().messages([topic for topic in topics if topic in self.topics], start_ns, stop_ns)
 
 
 def test_a_bag_without_true_poses_is_refused_in_one_line(bag: FormationBag) -> None:
-    with pytest.raises(BagError, match="no true poses.*record '/ground_truth/leader/odom'"):
+    with pytest.raises(BagError, match=r"no true poses.*record '/ground_truth/leader/odom'"):
         RunMoments(WithoutTruth(bag.bag))
