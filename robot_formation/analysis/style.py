@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -26,7 +26,7 @@ FACE_COLOURS = {"right": VERMILION, "front": GREEN, "rear": BLUE}
 AUXILIARY = "0.55"
 BAND = "0.92"
 
-STYLE = {
+STYLE: Any = {
     "font.size": 10.0,
     "axes.titlesize": 10.0,
     "axes.labelsize": 10.0,
@@ -41,7 +41,7 @@ STYLE = {
     "grid.color": "0.88",
     "grid.linewidth": 0.6,
     "svg.fonttype": "path",  # looks the same where the font is missing
-    "svg.hashsalt": "robot_formation",  # the same figure, the same file
+    "svg.hashsalt": "robot_formation",  # else the names in it are random
     "pdf.fonttype": 42,
 }
 
