@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robot_formation import conversions, names
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import Message, Topic
-from robot_formation.viewing.moment import FollowerNow, Forecast, Moment, Picture, RobotPose, finite_angles
+from robot_formation.viewing.moment import FollowerNow, Moment, Picture, RobotNow, ShownForecast, finite_angles
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_drawing import drawn
 
@@ -34,7 +34,7 @@ class LiveMoments:
     def __init__(self, robots: tuple[str, ...], formation_distance_m: float, *, delayed: bool = False) -> None:
         self._robots, self._delayed = robots, delayed
         self._to_place = Motion(y_m=-formation_distance_m)
-        self._poses: dict[str, RobotPose] = {}
+        self._poses: dict[str, RobotNow] = {}
         self._joints: dict[str, dict[str, float]] = {robot: {} for robot in robots}
         self._states: dict[str, str] = {}
         self._ends: dict[str, list[int]] = {robot: [] for robot in robots}
@@ -81,7 +81,7 @@ class LiveMoments:
     def at_present(self) -> Moment:
         """Return what is the case."""
         robots = {
-            robot: RobotPose(pose.position_m, pose.orientation, self._joints[robot])
+            robot: RobotNow(pose.position_m, pose.orientation, self._joints[robot])
             for robot, pose in self._poses.items()
         }
         return Moment(self.stamp_ns, robots, {robot: self._follower(robot) for robot in self._robots[1:]})
@@ -111,13 +111,13 @@ class LiveMoments:
             pose = None if now is None else now.planar
         return None if pose is None else pose.then(self._to_place)
 
-    def _forecast(self, robot: str) -> Forecast | None:
+    def _forecast(self, robot: str) -> ShownForecast | None:
         stamp_ns, mean, covariance = self._predictions.get(robot, (0, None, ()))
         start = self._resting(robot, stamp_ns)
         if mean is None or start is None or not mean.finite:
             return None
         # Of (x, y): u is -y, v is x.
-        return Forecast(start, mean, (covariance[4], -covariance[1], covariance[0]))
+        return ShownForecast(start, mean, (covariance[4], -covariance[1], covariance[0]))
 
     def _resting(self, robot: str, stamp_ns: int) -> Motion | None:
         """Return where a robot rested at a stamp, or at its start."""
@@ -127,7 +127,7 @@ class LiveMoments:
 
     def _odometry(self, robot: str, message: Message) -> None:
         p, o = message.pose.pose.position, message.pose.pose.orientation
-        self._poses[robot] = RobotPose((p.x, p.y, p.z), (o.x, o.y, o.z, o.w))
+        self._poses[robot] = RobotNow((p.x, p.y, p.z), (o.x, o.y, o.z, o.w))
         self.stamp_ns = max(self.stamp_ns, conversions.stamp_of(message))
 
     def _joint_states(self, robot: str, message: Message) -> None:
@@ -137,7 +137,7 @@ class LiveMoments:
         self._rests[robot].append((conversions.stamp_of(message), conversions.read_pose(message.pose)))
         if robot not in self._poses:  # one that stands since the start tells nothing else
             p, o = message.pose.position, message.pose.orientation
-            self._poses[robot] = RobotPose((p.x, p.y, p.z), (o.x, o.y, o.z, o.w))
+            self._poses[robot] = RobotNow((p.x, p.y, p.z), (o.x, o.y, o.z, o.w))
 
     def _path(self, robot: str, message: Message) -> None:
         places = [pose.pose.position for pose in message.poses]

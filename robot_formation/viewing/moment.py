@@ -33,7 +33,7 @@ _WORDS = {
 
 
 @dataclass(frozen=True)
-class RobotPose:
+class RobotNow:
     """A robot's true pose in the world, and the angle of each wheel by its joint's name, radians."""
 
     position_m: Vector
@@ -52,7 +52,7 @@ def finite_angles(joints: Iterable[str], positions: Iterable[float]) -> dict[str
 
 
 @dataclass(frozen=True)
-class Forecast:
+class ShownForecast:
     """The next displacement as the predictor tells it.
 
     Attributes:
@@ -105,7 +105,7 @@ class FollowerNow:
     state: str = ""
     finished: int = 0
     place: Motion | None = None
-    forecast: Forecast | None = None
+    forecast: ShownForecast | None = None
 
     @property
     def words(self) -> str:
@@ -122,7 +122,7 @@ class Moment:
     """An instant of a run: simulated time, robots and followers by name."""
 
     stamp_ns: int
-    robots: Mapping[str, RobotPose] = field(default_factory=dict)
+    robots: Mapping[str, RobotNow] = field(default_factory=dict)
     followers: Mapping[str, FollowerNow] = field(default_factory=dict)
 
 

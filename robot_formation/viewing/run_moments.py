@@ -19,7 +19,7 @@ from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.source import RawMessage
 from robot_formation.geometry.se2 import Motion
 from robot_formation.viewing.lens import Lens, read_lens
-from robot_formation.viewing.moment import FollowerNow, Forecast, Moment, RobotPose, TimestepFigures, finite_angles
+from robot_formation.viewing.moment import FollowerNow, Moment, RobotNow, ShownForecast, TimestepFigures, finite_angles
 from robot_formation.viewing.robot_shape import read_shape
 from robot_formation.viewing.true_poses import TruePoses
 
@@ -111,7 +111,7 @@ class RunMoments:
         robots = {}
         for robot, poses in self._poses.items():
             pose = poses.at(stamp_ns)
-            robots[robot] = RobotPose(pose.position, pose.orientation, self._joints[robot].at(stamp_ns))
+            robots[robot] = RobotNow(pose.position, pose.orientation, self._joints[robot].at(stamp_ns))
         return Moment(stamp_ns, robots, {f.name: self._follower(f, stamp_ns) for f in self.record.followers})
 
     @cached_property
@@ -148,14 +148,14 @@ class RunMoments:
             pose = None if track is None else track.at(stamp_ns)
         return None if pose is None else pose.then(Motion(y_m=-self.record.formation_distance_m))
 
-    def _forecast(self, follower: FollowerRecord, stamp_ns: int) -> Forecast | None:
+    def _forecast(self, follower: FollowerRecord, stamp_ns: int) -> ShownForecast | None:
         count = _count([prediction.stamp_ns for prediction in follower.predictions], stamp_ns)
         track = self.record.tracks.get(follower.name)
         told = follower.predictions[count - 1] if count else None
         start = None if track is None or told is None else track.at(told.stamp_ns)
         if told is None or start is None or not told.motion.finite:
             return None
-        return Forecast(start, told.motion, told.covariance_uv)
+        return ShownForecast(start, told.motion, told.covariance_uv)
 
     def _text(self, topic: str) -> str:
         messages = self._beside[topic]

@@ -16,7 +16,7 @@ from robot_formation.geometry.orientation import Quaternion, Vector
 from robot_formation.geometry.se2 import Motion
 from robot_formation.viewing.ground_lines import GroundHeight, contour_lines
 from robot_formation.viewing.lens import Lens
-from robot_formation.viewing.moment import Forecast, Moment, Picture, RobotPose
+from robot_formation.viewing.moment import Moment, Picture, RobotNow, ShownForecast
 from robot_formation.viewing.robot_shape import Link, Part, Rgb
 
 _GROUND_RGB: Rgb = (206, 210, 200)
@@ -59,7 +59,7 @@ class Stage:
         self._cameras: dict[str, Any] = {}
         self._places: dict[str, Any] = {}
         self._outlines: dict[str, NDArray[np.float64]] = {}
-        self._forecasts: dict[str, tuple[Forecast | None, Any]] = {}
+        self._forecasts: dict[str, tuple[ShownForecast | None, Any]] = {}
         self._shown: dict[str, tuple[float, ...]] = {}
         self._scene.world_axes.visible = False
         # Shadows take most of the time of a browser that draws without a graphics card.
@@ -145,7 +145,7 @@ class Stage:
                 self._place(robot, now.place)
                 self._forecast(robot, now.forecast)
 
-    def _move(self, robot: str, pose: RobotPose) -> None:
+    def _move(self, robot: str, pose: RobotNow) -> None:
         if robot not in self._frames:
             return
         self._put(f"/robots/{robot}", self._frames[robot], pose.position_m, pose.orientation)
@@ -173,7 +173,7 @@ class Stage:
         (height,) = self._height.of(np.array([[place.x_m, place.y_m]])).tolist()
         self._put(key, self._places[key], (place.x_m, place.y_m, height + 2 * _LIFT_M), _about_z(place.yaw_rad))
 
-    def _forecast(self, robot: str, forecast: Forecast | None) -> None:
+    def _forecast(self, robot: str, forecast: ShownForecast | None) -> None:
         shown, handle = self._forecasts.get(robot, (None, None))
         if forecast is None or forecast == shown:
             if handle is not None and forecast is None and shown is not None:
@@ -188,7 +188,7 @@ class Stage:
             handle.visible = True
         self._forecasts[robot] = (forecast, handle)
 
-    def _forecast_lines(self, forecast: Forecast) -> NDArray[np.float64]:
+    def _forecast_lines(self, forecast: ShownForecast) -> NDArray[np.float64]:
         """Return the displacement, a cross where it ends, and the ellipse around it, (n, 2, 3)."""
         start, end = forecast.start, forecast.end
         arm = _CROSS_M

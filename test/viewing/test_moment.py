@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from robot_formation.analysis.quantiles import ELLIPSE_90
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import Motion
-from robot_formation.viewing.moment import FollowerNow, Forecast, TimestepFigures, figures_in_words
+from robot_formation.viewing.moment import FollowerNow, ShownForecast, TimestepFigures, figures_in_words
 
 
 @given(
@@ -23,7 +23,7 @@ def test_every_point_of_the_ellipse_has_the_mahalanobis_distance_of_90_percent(
     yaw: float, sigma_u: float, sigma_v: float, correlation: float
 ) -> None:
     uv = correlation * sigma_u * sigma_v
-    forecast = Forecast(Motion(1.0, 2.0, yaw), Motion.from_uv(0.01, 0.05), (sigma_u**2, uv, sigma_v**2))
+    forecast = ShownForecast(Motion(1.0, 2.0, yaw), Motion.from_uv(0.01, 0.05), (sigma_u**2, uv, sigma_v**2))
     inverse = np.linalg.inv(np.array([[sigma_u**2, uv], [uv, sigma_v**2]]))
     for x_m, y_m in forecast.ellipse(12).tolist():
         told = Motion(x_m, y_m).relative_to(forecast.start)
@@ -32,7 +32,7 @@ def test_every_point_of_the_ellipse_has_the_mahalanobis_distance_of_90_percent(
 
 
 def test_an_exact_forecast_is_one_place() -> None:
-    forecast = Forecast(Motion(1.0, 2.0, math.pi / 2), Motion(0.05, 0.0), (0.0, 0.0, 0.0))
+    forecast = ShownForecast(Motion(1.0, 2.0, math.pi / 2), Motion(0.05, 0.0), (0.0, 0.0, 0.0))
     assert np.allclose(forecast.ellipse(), (1.0, 2.05))
 
 
