@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from robot_formation.errors import FormationError
+from robot_formation.viewing.gif_palette import Palette
 
 Picture = NDArray[np.uint8]
 """RGB, (rows, columns, 3)."""
 
 SUFFIXES = (".gif", ".mp4", ".png")
-_COLOURS = 192
 _LAST_MS = 2000
 """How long a GIF shows its last picture before it begins again."""
 
@@ -67,9 +67,8 @@ def write_gif(path: Path, pictures: Iterable[Picture], palette_of: Sequence[Pict
         AnimationError: the file can't be written.
     """
     # One palette and no dithering: what doesn't move is the same in all pictures, and costs nothing.
-    palette = Image.fromarray(np.vstack(list(palette_of))).quantize(_COLOURS, method=Image.Quantize.MAXCOVERAGE)
-    none = Image.Dither.NONE
-    first, *others = (Image.fromarray(picture).quantize(palette=palette, dither=none) for picture in pictures)
+    palette = Palette(np.vstack(list(palette_of)))
+    first, *others = (palette.image(picture) for picture in pictures)
     shown_ms = max(2, round(100.0 / fps)) * 10
     with _unfinished(path) as unfinished:
         first.save(

@@ -13,7 +13,7 @@ from robot_formation.analysis.run_record import Ground
 from robot_formation.analysis.style import FACE_COLOURS, FOLLOWER_COLOURS, LEADER_COLOUR
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import LEADER
-from robot_formation.viewing.recorded_scene import Forecast, RecordedScene
+from robot_formation.viewing.recorded_scene import PlaceForecast, RecordedScene
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -42,7 +42,7 @@ def robot_colour(robot: str) -> str:
     return FOLLOWER_COLOURS[(int(robot.rpartition("_")[2]) - 1) % len(FOLLOWER_COLOURS)]
 
 
-def ellipse_uv_m(forecast: Forecast) -> Array:
+def ellipse_uv_m(forecast: PlaceForecast) -> Array:
     """Return the outline (n, 2) of a forecast's 90 % ellipse about its middle: u and v in its heading, metres."""
     values, vectors = np.linalg.eigh(forecast.covariance_uv)
     axes = vectors * np.sqrt(ELLIPSE_90 * np.maximum(values, 0.0))

@@ -20,7 +20,7 @@ from robot_formation.viewing.recorded_world import recorded_world
 from robot_formation.viewing.true_poses import TruePoses, true_poses
 
 
-class Forecast(NamedTuple):
+class PlaceForecast(NamedTuple):
     """Where a follower is expected to end its timestep.
 
     Attributes:
@@ -34,7 +34,7 @@ class Forecast(NamedTuple):
     covariance_uv: NDArray[np.float64]
 
 
-class Corrections(NamedTuple):
+class CorrectionSums(NamedTuple):
     """Summed corrections of a timestep so far, metres."""
 
     u_m: float
@@ -123,7 +123,7 @@ class RecordedScene:
         """Return how far a pose is from the follower's place: (u, v) in its neighbour's frame, metres."""
         return formation_error_uv_m(pose, self.beside(stamp_ns), self._distance_m)
 
-    def forecast(self, stamp_ns: int) -> Forecast | None:
+    def forecast(self, stamp_ns: int) -> PlaceForecast | None:
         """Return where the follower is expected to end the timestep; None where nothing is forecast."""
         made = self.finished(stamp_ns)
         if not 0 < made <= min(len(self._record.predictions), self.timesteps - 1):
@@ -133,12 +133,12 @@ class RecordedScene:
             return None
         uu, uv, vv = prediction.covariance_uv
         from_pose = self.at(self.follower, prediction.stamp_ns)
-        return Forecast(from_pose.then(prediction.motion), from_pose.yaw_rad, np.array([[uu, uv], [uv, vv]]))
+        return PlaceForecast(from_pose.then(prediction.motion), from_pose.yaw_rad, np.array([[uu, uv], [uv, vv]]))
 
-    def corrections(self, timestep: int, stamp_ns: int) -> Corrections:
+    def corrections(self, timestep: int, stamp_ns: int) -> CorrectionSums:
         """Return what a timestep's corrections have summed up to."""
         done = [move for end_ns, move in self._moves[timestep - 1] if end_ns <= stamp_ns]
-        return Corrections(sum(abs(move.u_m) for move in done), sum(abs(move.v_m) for move in done))
+        return CorrectionSums(sum(abs(move.u_m) for move in done), sum(abs(move.v_m) for move in done))
 
     @property
     def timesteps_with_moves(self) -> int:

@@ -6,6 +6,7 @@ true poses, the marker and the ground of the run; they are without noise and fli
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ from robot_formation.vision.recorded_messages import read_blocks, read_image
 from robot_formation.world.camera import Camera, RenderedPicture
 from robot_formation.world.pose import Pose
 from robot_formation.world.sensor import Sensor
+
+_TRUE_POSES = re.compile(re.escape(names.ground_truth_odom("ROBOT").of()).replace("ROBOT", "([^/]+)"))
 
 
 class CameraView(NamedTuple):
@@ -105,7 +108,8 @@ class _Renderer:
         details = bag.metadata(METADATA_NAME)
         self.known_world = tells_world(details)
         parameters = recorded_world(details, bag.path)
-        poses = true_poses(bag, parameters.robots, 10**9 // parameters.state_rate_hz)
+        robots = [match[1] for topic in bag.topics if (match := _TRUE_POSES.fullmatch(topic))]
+        poses = true_poses(bag, robots, 10**9 // parameters.state_rate_hz)
         if robot not in poses:
             topics = f"'{names.camera_image().of(robot)}' or '{names.ground_truth_odom(robot).of()}'"
             raise BagError(
