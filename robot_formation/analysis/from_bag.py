@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robot_formation import names
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.run_record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
+from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.message_recorder import METADATA_NAME
+from robot_formation.bag.odometry import ODOMETRY_TYPE, Odometry
 from robot_formation.bag.reader import read_bag
+from robot_formation.bag.source import RawMessage
 from robot_formation.geometry.orientation import yaw_rad
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import Message
@@ -50,15 +54,49 @@ def run_record(bag: FormationBag) -> RunRecord:
         BagError: the bag is corrupted, or a topic has another message type than a run's.
         AnalysisError: the bag has no run of a formation.
     """
-    robots = _robots(bag)
+    robots, messages, stamps = run_messages(bag)
+    return record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
+
+
+def run_messages(
+    bag: FormationBag, beside: Callable[[RawMessage], None] | None = None, topics: Collection[str] = ()
+) -> tuple[list[str], dict[str, Sequence[Message]], dict[str, list[int]]]:
+    """Read what a run's record is made of: robots, messages by topic, and simulated time [ns] of each of these.
+
+    Args:
+        bag: the open bag.
+        beside: takes messages of other topics as they were recorded: reading a long bag twice takes twice as long.
+        topics: their names.
+
+    Raises:
+        BagError: the bag is corrupted, or a topic has another message type than a run's.
+        AnalysisError: the bag has no run of a formation.
+    """
+    robots = robots_in(bag)
     wanted = run_topics(robots)
     bag.require({topic: type_name for topic, type_name in wanted.items() if topic in bag.topics})
     messages: dict[str, list[Message]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
-    for message in bag.messages(wanted):
-        messages[message.topic].append(message.message)
-        stamps[message.topic].append(message.stamp_ns)
-    return record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
+    cdr: dict[str, list[bytes]] = defaultdict(list)
+    for raw in bag.raw_messages({*wanted, *topics}):
+        if raw.topic not in wanted:
+            if beside is not None:
+                beside(raw)
+            continue
+        stamps[raw.topic].append(raw.stamp_ns)
+        if raw.type_name == ODOMETRY_TYPE:
+            cdr[raw.topic].append(raw.cdr)
+        else:
+            messages[raw.topic].append(bag.bag.decoded(raw).message)
+    return robots, {**messages, **{topic: _odometry(bag, topic, found) for topic, found in cdr.items()}}, stamps
+
+
+def _odometry(bag: FormationBag, topic: str, cdr: Sequence[bytes]) -> Odometry:
+    try:
+        return Odometry(cdr)
+    except Exception as error:  # rosbags' decoders have no common error
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BagError(f"{bag.path}: '{topic}' holds a message that can't be read: {reason}") from error
 
 
 def record_of(
@@ -75,7 +113,7 @@ def record_of(
         details: what the run says of itself.
         stamps: simulated time [ns] of each of these messages, where it is known.
     """
-    messages = defaultdict(list, messages)
+    messages = defaultdict(tuple, messages)
     stamps = defaultdict(list, stamps or {})
     markers = messages[names.SURFACE.of()]
     tracks = {robot: _track(messages[names.ground_truth_odom(robot).of()]) for robot in robots}
@@ -85,7 +123,7 @@ def record_of(
         tracks={robot: track for robot, track in tracks.items() if track is not None},
         simulated_s=_last_stamp_ns(messages) / 1e9,
         details=details,
-        ground=_ground(markers[-1]) if markers else None,
+        ground=read_ground(markers[-1]) if markers else None,
         left_plate=tuple(message.data for message in messages[names.left_plate().of()]),
     )
     return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
@@ -144,7 +182,7 @@ def _last_stamp_ns(messages: Mapping[str, Sequence[Message]]) -> int:
     )
 
 
-def _robots(bag: FormationBag) -> list[str]:
+def robots_in(bag: FormationBag) -> list[str]:
     """Find the robots by their topics: the leader, then the followers by number."""
     topics = "|".join(topic.name for topic in (*_MOTIONS, names.ALIGNMENT))
     found = {match[1] for topic in bag.topics if (match := re.fullmatch(rf"/follower_([1-9]\d*)/(?:{topics})", topic))}
@@ -229,6 +267,10 @@ def _track(messages: Sequence[Message]) -> Track | None:
     """Turn Odometry messages into a true path, in order of their stamps."""
     if not messages:
         return None
+    if isinstance(messages, Odometry):
+        order = np.argsort(messages.stamps_ns, kind="stable")
+        yaws = np.array([yaw_rad(turn) for turn in messages.orientations.tolist()])
+        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order])
     poses = [message.pose.pose for message in messages]
     stamps = np.array([_stamp_ns(message) for message in messages], dtype=np.int64)
     positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
@@ -262,12 +304,17 @@ def _overhead(
         moved[0] = moved[1]
         stamps = np.array([_stamp_ns(message) for message in told], dtype=np.int64)[moved]
         seen = places[moved]
-        true_stamps = np.array([_stamp_ns(message) for message in truth], dtype=np.int64)
+        odometry = truth if isinstance(truth, Odometry) else None
+        true_stamps = np.array([_stamp_ns(m) for m in truth]) if odometry is None else odometry.stamps_ns
         order = np.argsort(true_stamps, kind="stable")
         # A robot that stands says nothing, so its last word before the picture holds.
         index = np.searchsorted(true_stamps[order], stamps, side="right") - 1
         known = index >= 0
-        dots = np.array([_dot(truth[entry].pose.pose, dot_height_m) for entry in order[index[known]]])
+        entries = order[index[known]]
+        if odometry is None:
+            dots = np.array([_dot(truth[entry].pose.pose, dot_height_m) for entry in entries])
+        else:
+            dots = _dots(odometry.positions_m[entries], odometry.orientations[entries], dot_height_m)
         tracks[robot] = OverheadTrack(stamps[known], seen[known].reshape(-1, 3), dots.reshape(-1, 3))
     return tracks
 
@@ -288,8 +335,15 @@ def _up(q: Message) -> tuple[float, float, float]:
     return 2.0 * (q.x * q.z + q.y * q.w), 2.0 * (q.y * q.z - q.x * q.w), 1.0 - 2.0 * (q.x * q.x + q.y * q.y)
 
 
-def _ground(marker: Message) -> Ground | None:
-    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices."""
+def _dots(places_m: NDArray[np.float64], turns: NDArray[np.float64], height_m: float) -> NDArray[np.float64]:
+    """Return the places (n, 3) of a robot's dot at poses (n, 3) and (n, 4): see `_dot`."""
+    x, y, z, w = turns.T
+    up = np.column_stack([2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)])
+    return places_m + height_m * up
+
+
+def read_ground(marker: Message) -> Ground | None:
+    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices; None for others."""
     if marker.type != _TRIANGLE_LIST or len(marker.points) < 3:
         return None
     corners = np.array([(point.x, point.y, point.z) for point in marker.points])

@@ -44,8 +44,7 @@ def text_report(record: RunRecord, analysis: RunAnalysis) -> str:
         sections.append("\n".join(_table(follower)))
         sections.append("\n".join(_totals(follower)))
     if analysis.string_stability is not None:
-        sections.append("
-".join(["along the chain", *_along_the_chain(analysis.string_stability)]))
+        sections.append("\n".join(["along the chain", *_along_the_chain(analysis.string_stability)]))
     sections.append(f"outcome: {analysis.outcome}{_who_is_lost(analysis)}")
     return "\n\n".join(sections)
 

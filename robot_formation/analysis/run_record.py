@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from robot_formation.bag.run_details import node_parameters, said_slots, whole_n
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
 from robot_formation.geometry.slots import leader_places, slot
+from robot_formation.json_values import JsonObject
 from robot_formation.schedule.schedules import Spacing
 
 DOT_HEIGHT_M = 0.216
@@ -149,6 +151,11 @@ class RunRecord:
     overhead: Mapping[str, OverheadTrack] = field(default_factory=dict)
     left_plate: tuple[str, ...] = ()
 
+    @cached_property
+    def _parameters(self) -> dict[str, JsonObject]:
+        """The parameters of the run's nodes, read once: they are long."""
+        return node_parameters(self.details)
+
     @property
     def timesteps_planned(self) -> int | None:
         """Timesteps that the scenario has, if the run says."""
@@ -162,7 +169,7 @@ class RunRecord:
     def world_number(self, name: str, default: float) -> float:
         """Return a parameter of the run's world; the default where it says none, or no finite number above 0."""
         try:
-            said = float(node_parameters(self.details)["world"][name])
+            said = float(self._parameters["world"][name])
         except (KeyError, ValueError, TypeError, OverflowError):
             return default
         return said if math.isfinite(said) and said > 0.0 else default
@@ -171,7 +178,7 @@ class RunRecord:
     def formation_distance_m(self) -> float:
         """Distance between neighbours abreast, metres: the run's fine-tuner's, else the paper's."""
         try:
-            said = float(node_parameters(self.details)["fine_tuner"]["formation_distance_m"])
+            said = float(self._parameters["fine_tuner"]["formation_distance_m"])
         except (KeyError, ValueError, TypeError, OverflowError):
             return FORMATION_DISTANCE_M
         return said if math.isfinite(said) else FORMATION_DISTANCE_M
@@ -190,5 +197,5 @@ class RunRecord:
     @property
     def delayed(self) -> bool:
         """Whether followers keep their places beside where their neighbours stood one timestep earlier."""
-        fine_tuner = node_parameters(self.details).get("fine_tuner", {})
+        fine_tuner = self._parameters.get("fine_tuner", {})
         return fine_tuner.get("spacing") == Spacing.DELAYED.value

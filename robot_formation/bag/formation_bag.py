@@ -86,7 +86,10 @@ class FormationBag:
 
     def raw_messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
         """See `Bag.raw_messages`."""
-        for message in self.bag.raw_messages([self._full(topic) for topic in topics]):
+        found = self.bag.raw_messages([self._full(topic) for topic in topics])
+        if not self.namespace:
+            yield from found  # as they are: a long bag has hundreds of thousands
+        for message in found:
             yield message._replace(topic=message.topic[len(self.namespace) :])
 
     def _full(self, topic: str) -> str:

@@ -20,9 +20,10 @@ from robot_formation.cli import (
     sweep,
     teach,
     test,
+    view,
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, animate, path, predict, record, play, info, recover, replay),
+    *(run, sweep, list_, analyze, view, animate, path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )

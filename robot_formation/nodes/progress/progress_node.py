@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
@@ -12,48 +11,17 @@ from rclpy.executors import Executor
 
 from robot_formation import conversions, exit_codes
 from robot_formation.experiment.progress import Progress
-from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
-from robot_formation.geometry.slots import Slots, slot
 from robot_formation.names import Message
+from robot_formation.nodes.followed_run import FollowedRunParameters
 from robot_formation.nodes.host.component_node import qos_profile
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.ros_parameters import ParameterNode, declare
 from robot_formation.nodes.host.signals import stopped
 from robot_formation.nodes.progress.monitor import topic_of
-from robot_formation.parameters import ParameterError, parameter
 
 _IDLE_S = 0.1
 _ROUND_S = 0.03
 _QUIET_ROUNDS, _MOST_ROUNDS = 4, 60
-
-
-@dataclass(frozen=True)
-class ProgressParameters:
-    """What is followed."""
-
-    followers: int = parameter(1, "Number of followers", low=1, high=10)
-    timesteps: int = parameter(15, "Timesteps of the run, for the lines", low=1, high=1_000_000)
-    slots: tuple[float, ...] = parameter(
-        (),
-        "Each follower's place, for the formation error: distance to its neighbour's right, offset ahead, one after "
-        "another; empty: 0.32 m beside",
-        unit="m",
-        low=-2.0,
-        high=2.0,
-    )
-    delayed: bool = parameter(False, "Whether places are those of one timestep earlier, for the formation error")
-
-    def __post_init__(self) -> None:
-        """Check that each follower has a place."""
-        if len(self.slots) not in (0, 2 * self.followers):
-            raise ParameterError(
-                f"progress: 'slots' has {len(self.slots)} numbers, not two for each of {self.followers} followers"
-            )
-
-    def places(self) -> Slots:
-        """List the followers' places, each in its neighbour's frame."""
-        pairs = zip(self.slots[::2], self.slots[1::2], strict=True)
-        return [slot(*pair) for pair in pairs] or [slot(FORMATION_DISTANCE_M)] * self.followers
 
 
 class ProgressExecutable:
@@ -62,7 +30,7 @@ class ProgressExecutable:
     fixed: ClassVar[Mapping[str, str]] = {"*": "it decides on topics and lines; start another one"}
 
     def __init__(self, node: ParameterNode) -> None:
-        (parameters,) = declare(node, ProgressParameters, fixed=self.fixed)
+        (parameters,) = declare(node, FollowedRunParameters, fixed=self.fixed)
         self._node = node
         self._messages = 0
         began = time.monotonic()

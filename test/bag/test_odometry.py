@@ -1,0 +1,66 @@
+"""Odometry of a topic: poses of all messages at once are those of the messages one by one."""
+
+import numpy as np
+import pytest
+
+from repository import ROOT
+from robot_formation import conversions, names
+from robot_formation.bag.formation_bag import FormationBag
+from robot_formation.bag.odometry import Odometry, _columns
+from robot_formation.bag.reader import read_bag
+
+TOPIC = names.ground_truth_odom(names.LEADER).of()
+
+
+def recorded() -> list[bytes]:
+    with read_bag(ROOT / "bags" / "samples" / "track_two_formation") as bag:
+        return [raw.cdr for raw in FormationBag(bag).raw_messages([TOPIC])]
+
+
+def one(child: str, x_m: float, stamp_ns: int) -> bytes:
+    message = conversions.body_odometry(
+        (x_m, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.0,) * 3, (0.0,) * 3, frame="world", child=child, stamp_ns=stamp_ns
+    )
+    return conversions.to_cdr(message)
+
+
+@pytest.mark.parametrize(
+    "cdr",
+    [
+        recorded(),
+        [one("a/base_link", 1.0, 5), one("a/base_link", 1.5, 7 * 10**9 + 3)],
+        [one("a", 1.0, 5), one("longer", 1.5, 6)],
+    ],
+    ids=["recorded", "made", "frames that differ"],
+)
+def test_columns_are_what_the_messages_hold(cdr: list[bytes]) -> None:
+    found = Odometry(cdr)
+    assert len(found) == len(cdr)
+    for index in {0, len(cdr) // 2, len(cdr) - 1}:
+        message = conversions.from_cdr(cdr[index], "nav_msgs/msg/Odometry")
+        p, o = message.pose.pose.position, message.pose.pose.orientation
+        assert found.positions_m[index].tolist() == [p.x, p.y, p.z]
+        assert found.orientations[index].tolist() == [o.x, o.y, o.z, o.w]
+        assert found.stamps_ns[index] == conversions.stamp_of(message)
+        assert found[index].header.frame_id == message.header.frame_id
+    assert [m.pose.pose.position.x for m in found[:2]] == found.positions_m[:2, 0].tolist()
+
+
+def test_messages_with_the_same_frames_are_read_at_once_and_others_one_by_one() -> None:
+    assert _columns(recorded()) is not None
+    assert _columns([one("a", 1.0, 5), one("longer", 1.5, 6)]) is None
+    assert _columns([b"\0\1\0\0" + bytes(8) + b"\xff" * 8]) is None
+    assert _columns([b""]) is None
+
+
+def test_a_message_that_is_cut_off_is_an_error() -> None:
+    whole = one("a", 1.0, 5)
+    with pytest.raises(Exception, match=r".+"):
+        Odometry([whole[:60]])
+
+
+def test_stamps_and_poses_are_numbers_of_their_types() -> None:
+    found = Odometry(recorded())
+    assert found.stamps_ns.dtype == np.int64
+    assert found.positions_m.shape == (len(found), 3)
+    assert found.orientations.shape == (len(found), 4)
