@@ -5,6 +5,7 @@ from __future__ import annotations
 from robot_formation.cli import (
     analyze,
     calibrate,
+    compare,
     detect,
     doctor,
     info,
@@ -15,6 +16,7 @@ from robot_formation.cli import (
     record,
     recover,
     replay,
+    report,
     run,
     sweep,
     teach,
@@ -22,6 +24,6 @@ from robot_formation.cli import (
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, path, predict, record, play, info, recover, replay),
+    *(run, sweep, list_, analyze, compare, report, path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )
