@@ -107,7 +107,7 @@ def draw_trajectories(runs: Sequence[Run], path: Path) -> Path:
         for run in shown:
             _paths(axes, run)
         _crop(axes, shown)
-        axes.set(xlabel="x (cm)    thin: leader, circle: start, square: end", ylabel="y (cm)", aspect="equal")
+        axes.set(xlabel="x (cm); thin line: leader, circle: start, square: end", ylabel="y (cm)", aspect="equal")
         if len(grounds) > 1:
             axes.set_title(", ".join(run.label for run in shown), loc="left", fontsize=10)
     _legend(figure, runs)
@@ -203,7 +203,7 @@ def _paths(axes: Axes, run: Run) -> None:
 
 
 def _mark(axes: Axes, place_cm: NDArray[np.float64], mark: str) -> None:
-    style = {"markerfacecolor": "white", "markeredgecolor": "black", "markersize": 6, "zorder": 4}
+    style: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": "black", "markersize": 6, "zorder": 4}
     axes.plot(*place_cm, mark, linestyle="none", **style)
 
 

@@ -13,7 +13,7 @@ from robot_formation.reporting.comparison_figures import (
 )
 from robot_formation.reporting.comparison_table import comparisons, differing_rows
 from robot_formation.reporting.inline_svg import figure
-from robot_formation.reporting.markup import element, paragraph, section, table
+from robot_formation.reporting.markup import Content, element, paragraph, section, table
 from robot_formation.reporting.runs import Run
 
 _LONG_VALUE = 120
@@ -34,7 +34,7 @@ def comparison_sections(runs: Sequence[Run], folder: Path) -> Iterator[Element]:
     yield section("Side by side", element("ul", *listed), *tables)
     yield section("Corrections and errors of all runs", *_figures(runs, folder))
     differs = differing_rows(runs, _LONG_VALUE)
-    rows = [(element("code", name), *values) for name, values in differs.rows]
+    rows: list[tuple[Content, ...]] = [(element("code", name), *values) for name, values in differs.rows]
     shown = table("What the runs say differently of themselves", heads, rows, class_="words")
     yield section("What differs", shown if rows else paragraph("Nothing of what the runs say of themselves."))
 

@@ -19,7 +19,7 @@ _DARK_TEXT, _DARK_GROUND = 0xE8, 0x19  # greys of the dark scheme
 _STYLE = """
 :root { color-scheme: light dark; --text: #1a1a1a; --back: #ffffff; --soft: #f3f4f6; --line: #d4d7dc;
   --quiet: #55595f; --link: #00568a; LIGHT }
-@media (prefers-color-scheme: dark) { :root { --text: #e8e8e8; --back: #17191c; --soft: #22252a; --line: #41464e;
+@media (prefers-color-scheme: dark) { :root { --text: #e8e8e8; --back: #191919; --soft: #262626; --line: #41464e;
   --quiet: #aab0b8; --link: #7cc4ee; DARK } }
 * { box-sizing: border-box; }
 body { margin: 0 auto; max-width: 64rem; padding: 1rem 1.25rem 3rem; background: var(--back); color: var(--text);

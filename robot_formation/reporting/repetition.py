@@ -14,6 +14,7 @@ from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.scenario import FOLLOWS_FROM_SETUP, Scenario
 from robot_formation.json_values import Json, JsonObject
+from robot_formation.parameters import to_mapping
 
 _PRESET = "track_"
 _OPTIONS = {"predictor.name": "--predictor", "leader.path": "--path", "world.camera.mode": "--camera"}
@@ -82,7 +83,7 @@ def _setup(name: str, nodes: dict[str, JsonObject], preset: Scenario) -> list[st
         "heading_deg": _degrees(world["start_heading_rad"][0]),
         "blackouts": [list(pair) for pair in zip(blackouts[::2], blackouts[1::2], strict=True)],
     }
-    own = scenarios.to_mapping(preset.setup)
+    own = to_mapping(preset.setup)
     settings = [f"{key}={_yaml(value)}" for key, value in wanted.items() if value not in (own[key], "")]
     # Before the start, which a path chooses if it isn't given.
     for key in ("leader.path", "leader.path_parameters", "world.surface", "world.surface_parameters"):

@@ -57,7 +57,7 @@ class Run:
 
     def to_json(self) -> JsonObject:
         """Return what `formation analyze --json` prints of it, without pictures."""
-        files = {"bag": str(self.bag), "pictures": [], "reason": None}
+        files: JsonObject = {"bag": str(self.bag), "pictures": [], "reason": None}
         return {**self.analysis.to_json(), **self.facts, **files}
 
 

@@ -26,6 +26,7 @@ _QUANTITIES = (
 )
 _HALF = 0.22  # from a predictor's place to its points' and to its median's
 _LOST = "#D00000"
+_LEAST_SHOWN = -150.0  # per cent; a predictor that corrects little may multiply what is nearly nothing
 
 
 def draw_distributions(rows: Sequence[Row], summary: Sequence[JsonObject], path: Path, most_seeds: int) -> Path:
@@ -49,7 +50,7 @@ def draw_distributions(rows: Sequence[Row], summary: Sequence[JsonObject], path:
         for number, entry in enumerate(summary):
             _median(axes, number, entry[key])
         axes.set_ylabel(title)
-        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]) if axes.get_ylim()[0] < 0.0 else 0.0)
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.grid(axis="y", color="0.88", linewidth=0.6)
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
@@ -74,16 +75,17 @@ def draw_reductions(summary: Sequence[JsonObject], path: Path) -> Path:
 
     known = [entry for entry in summary if entry["reduction"] is not None and entry["predictor"] != BASELINE]
     groups = list(dict.fromkeys(group_name(entry) for entry in known))
-    predictors = list(dict.fromkeys(str(entry["predictor"]) for entry in known))
+    # By their places among all, so that a predictor has one colour in all pictures.
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(str(entry["predictor"]) for entry in summary))}
+    predictors = [name for name in numbers if any(entry["predictor"] == name for entry in known)]
     finite = [100.0 * value for entry in known for value in entry["reduction"].values() if value is not None]
-    low = min([0.0, *finite]) - 6.0
+    low = max(_LEAST_SHOWN, min([0.0, *finite]) - 6.0)
     figure = new_figure(_WIDTH, 1.3 + len(groups) * (0.35 + 0.2 * len(predictors)))
     axes = figure.subplots()
     for entry in known:
-        number = predictors.index(entry["predictor"])
-        offset = (number + 0.5) / len(predictors) - 0.5
+        offset = (predictors.index(entry["predictor"]) + 0.5) / len(predictors) - 0.5
         place = groups.index(group_name(entry)) + 0.75 * offset
-        _interval(axes, place, entry["reduction"], low, number)
+        _interval(axes, place, entry["reduction"], low, numbers[entry["predictor"]])
     axes.axvline(0.0, color="0.4", linewidth=1.0)
     axes.set_xlim(low, max([5.0, *finite]) + 5.0)
     axes.set_ylim(len(groups) - 0.5, -0.5)
@@ -91,7 +93,7 @@ def draw_reductions(summary: Sequence[JsonObject], path: Path) -> Path:
     axes.set_xlabel("reduction against previous (%)")
     axes.grid(axis="x", color="0.88", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
-    handles = [Line2D([], [], linestyle="none", label=name, **_mark(number)) for number, name in enumerate(predictors)]
+    handles = [Line2D([], [], linestyle="none", label=name, **_mark(numbers[name])) for name in predictors]
     legend_below(figure, handles, min(3, len(handles)), fontsize=9)
     return save_figure(figure, path)
 
@@ -125,13 +127,17 @@ def _points(axes: Axes, rows: Sequence[Row], predictors: Sequence[str], seeds: S
     for number, name in enumerate(predictors):
         count = sum(predictor == name for predictor, _ in lost)
         if count:
-            style = {"transform": axes.get_xaxis_transform(), "color": _LOST, "fontsize": 9, "ha": "center"}
-            axes.text(number, 1.01, f"× {count} lost", va="bottom", **style)
+            style: dict[str, Any] = {"color": _LOST, "fontsize": 9, "ha": "center", "va": "bottom"}
+            axes.text(number, 1.01, f"× {count} lost", transform=axes.get_xaxis_transform(), **style)
 
 
 def _median(axes: Axes, number: int, found: dict[str, float | None] | None) -> None:
     """Draw a median with its interval; what is infinite, that is lost, ends at the picture's upper edge."""
-    if found is None or found["median"] is None:
+    if found is None:
+        return
+    if found["median"] is None:
+        upper = axes.get_xaxis_transform()
+        axes.text(number + _HALF, 0.98, "lost", transform=upper, color=_LOST, ha="center", va="top", fontsize=9)
         return
     middle = found["median"] * _CM
     low = middle if found["low"] is None else found["low"] * _CM
@@ -149,18 +155,22 @@ def _median(axes: Axes, number: int, found: dict[str, float | None] | None) -> N
     else:
         axes.plot([place, place], [low, found["high"] * _CM], color=colour, linewidth=2.0, zorder=3)
     axes.plot([place], [middle], "D", color=colour, markersize=7, zorder=4)
-    axes.annotate(f"{middle:.1f}", (place, middle), (7, 0), textcoords="offset points", va="center", fontsize=9)
+    axes.annotate(f"{middle:.3g}", (place, middle), (7, 0), textcoords="offset points", va="center", fontsize=9)
 
 
 def _interval(axes: Axes, place: float, found: dict[str, float | None], edge: float, number: int) -> None:
-    """Draw a reduction with its interval; what is infinitely bad ends at the picture's left edge."""
-    middle, low, high = (None if found[key] is None else 100.0 * found[key] for key in ("median", "low", "high"))  # type: ignore[operator]
-    if middle is None:
+    """Draw a reduction with its interval; what is beyond the left edge, or infinitely bad, ends there in an arrow."""
+    if found["median"] is None:
         axes.annotate("lost", (edge, place), (3, 0), textcoords="offset points", va="center", fontsize=9, color=_LOST)
         return
-    ends = [edge if low is None else low, middle if high is None else high]
-    axes.plot(ends, [place, place], color=_colour(number), linewidth=2.0)
-    axes.plot([middle], [place], linestyle="none", **_mark(number))
+    middle = 100.0 * found["median"]
+    left = edge if found["low"] is None else max(100.0 * found["low"], edge)
+    right = middle if found["high"] is None else 100.0 * found["high"]
+    axes.plot([left, max(right, edge)], [place, place], color=_colour(number), linewidth=2.0)
+    if left == edge:
+        axes.plot([edge], [place], "<", color=_colour(number), markersize=7, clip_on=False)
+    if middle >= edge:
+        axes.plot([middle], [place], linestyle="none", clip_on=False, **_mark(number))
 
 
 def _mark(number: int) -> dict[str, Any]:

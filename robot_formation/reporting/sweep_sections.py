@@ -83,8 +83,8 @@ def sweep_sections(sweep: Sweep, folder: Path, level: int) -> Iterator[Element]:
 def _what(sweep: Sweep) -> Iterator[Element]:
     plan, count = sweep.plan, len(sweep.rows)
     planned = len(plan.tracks) * len(plan.paths) * len(plan.surfaces) * len(plan.predictors) * len(plan.seeds)
-    left = "" if count == planned else f" of {planned}; the others have not been run yet"
-    yield paragraph(f"{count} runs{left}: every combination of what follows, each run in one process.")
+    left = "" if count == planned else f" {count} of these {planned} runs are there; the others are still to be run."
+    yield paragraph(f"Every combination of what follows, {planned} runs, each in one process.{left}")
     rows = [
         ("tracks", ", ".join(plan.tracks)),
         ("paths", ", ".join(plan.paths)),
@@ -97,7 +97,10 @@ def _what(sweep: Sweep) -> Iterator[Element]:
     ]
     yield table("What was run", ("what", "values"), rows, class_="words")
     lost = sum(row.lost for row in sweep.rows)
-    yield paragraph(f"{lost} of {count} runs were lost: they did not come to their last timestep.", class_="answer")
+    said = (
+        f"{lost} of {count} runs were lost: they did not come to their last timestep." if lost else "No run was lost."
+    )
+    yield paragraph(said, class_="answer")
 
 
 def _reductions(sweep: Sweep, summary: Sequence[JsonObject], folder: Path) -> Iterator[Element]:
@@ -110,7 +113,8 @@ def _reductions(sweep: Sweep, summary: Sequence[JsonObject], folder: Path) -> It
         lambda path: draw_reductions(summary, path),
         folder,
         title=f"Interval chart: reduction of each predictor against previous by track, path and surface; {sweep.name}",
-        caption="Reduction against previous, median and 95 % interval; right of the line a predictor corrects less.",
+        caption="Reduction against previous, median and 95 % interval; right of the line a predictor corrects less. "
+        "Arrow: the interval goes on to the left.",
     )
 
 
