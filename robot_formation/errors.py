@@ -24,6 +24,10 @@ class FormationError(ValueError):
         return _one_line(super().__str__())
 
 
+class MessageError(FormationError):
+    """A message can't be used; the text says why."""
+
+
 def shown(value: Any, most: int = _SHOWN) -> str:
     """Write a value from outside for a message: its `repr`, cut to some 80 characters, however large the value is."""
     text = _REPR.repr(value)

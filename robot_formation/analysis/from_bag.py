@@ -50,6 +50,17 @@ def run_record(bag: FormationBag) -> RunRecord:
         BagError: the bag is corrupted, or a topic has another message type than a run's.
         AnalysisError: the bag has no run of a formation.
     """
+    robots, messages, stamps = run_messages(bag)
+    return record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
+
+
+def run_messages(bag: FormationBag) -> tuple[list[str], dict[str, list[Message]], dict[str, list[int]]]:
+    """Read what a run's record is made of: robots, messages by topic, and simulated time [ns] of each of these.
+
+    Raises:
+        BagError: the bag is corrupted, or a topic has another message type than a run's.
+        AnalysisError: the bag has no run of a formation.
+    """
     robots = _robots(bag)
     wanted = run_topics(robots)
     bag.require({topic: type_name for topic, type_name in wanted.items() if topic in bag.topics})
@@ -58,7 +69,7 @@ def run_record(bag: FormationBag) -> RunRecord:
     for message in bag.messages(wanted):
         messages[message.topic].append(message.message)
         stamps[message.topic].append(message.stamp_ns)
-    return record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
+    return robots, messages, stamps
 
 
 def record_of(
@@ -85,7 +96,7 @@ def record_of(
         tracks={robot: track for robot, track in tracks.items() if track is not None},
         simulated_s=_last_stamp_ns(messages) / 1e9,
         details=details,
-        ground=_ground(markers[-1]) if markers else None,
+        ground=read_ground(markers[-1]) if markers else None,
         left_plate=tuple(message.data for message in messages[names.left_plate().of()]),
     )
     return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
@@ -283,8 +294,8 @@ def _dot(pose: Message, height_m: float) -> tuple[float, float, float]:
     return (x + height_m * up_x, y + height_m * up_y, z + height_m * (1.0 - 2.0 * (q.x * q.x + q.y * q.y)))
 
 
-def _ground(marker: Message) -> Ground | None:
-    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices."""
+def read_ground(marker: Message) -> Ground | None:
+    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices; None for others."""
     if marker.type != _TRIANGLE_LIST or len(marker.points) < 3:
         return None
     corners = np.array([(point.x, point.y, point.z) for point in marker.points])

@@ -77,9 +77,11 @@ class FormationBag:
         """See `Bag.require`."""
         self.bag.require({self._full(topic): type_name for topic, type_name in types.items()})
 
-    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+    def messages(
+        self, topics: Collection[str], start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[BagMessage]:
         """See `Bag.messages`."""
-        for message in self.bag.messages([self._full(topic) for topic in topics]):
+        for message in self.bag.messages([self._full(topic) for topic in topics], start_ns, stop_ns):
             yield message._replace(topic=message.topic[len(self.namespace) :])
 
     def raw_messages(self, topics: Collection[str]) -> Iterator[RawMessage]:

@@ -128,13 +128,15 @@ class Bag:
         except Exception:  # rosbags' type store has no common error
             return None
 
-    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        """Yield the messages of these topics in the order of their stamps.
+    def messages(
+        self, topics: Collection[str], start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[BagMessage]:
+        """Yield the messages of these topics in the order of their stamps; arguments as for `raw_messages`.
 
         Raises:
             BagError: the bag is corrupted, or holds less than it says.
         """
-        for raw in self.raw_messages(topics):
+        for raw in self.raw_messages(topics, start_ns, stop_ns):
             try:
                 message = self._typestore.deserialize_cdr(raw.cdr, raw.type_name)
             except Exception as error:  # rosbags' decoders have no common error

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from robot_formation import names
 from robot_formation.bag.definitions import jazzy_typestore
-from robot_formation.geometry.orientation import Vector, quaternion
+from robot_formation.geometry.orientation import Quaternion, Vector, quaternion
 from robot_formation.names import Message
 
 _POSES = re.compile(r"(.*)/ground_truth/([^/]+)/odom")
@@ -104,37 +104,53 @@ def _of_odometry(message: Message) -> Message:
     return _transform(message.header, message.child_frame_id, turn)
 
 
+def description_root(text: str) -> ElementTree.Element | None:
+    """Parse a robot's description (URDF); None for a text that is none."""
+    if len(text) > _MOST_CHARACTERS or "<!DOCTYPE" in text:
+        return None  # a description declares no entities, which small texts can make huge
+    try:
+        return ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError):
+        return None
+
+
+def origin_of(element: ElementTree.Element) -> tuple[Vector, Quaternion] | None:
+    """Read where a part of a description lies in its link: place [m] and orientation; None if that is no place."""
+    origin = element.find("origin")
+    if origin is None:
+        return (0.0, 0.0, 0.0), quaternion(0.0, 0.0, 0.0)
+    try:
+        return read_vector(origin.get("xyz", "0 0 0")), quaternion(*read_vector(origin.get("rpy", "0 0 0")))
+    except ValueError:  # neither three nor numbers
+        return None
+
+
+def read_vector(text: str) -> Vector:
+    """Read three numbers.
+
+    Raises:
+        ValueError: the text holds something else.
+    """
+    x, y, z = (float(number) for number in text.split())
+    return (x, y, z)
+
+
 def _of_description(robot: str, text: str) -> Iterator[Message]:
     """Make one transform per joint of a URDF; a text that is none gives none."""
     types = jazzy_typestore().types
-    if len(text) > _MOST_CHARACTERS or "<!DOCTYPE" in text:
-        return  # a description declares no entities, which small texts can make huge
-    try:
-        joints = list(ElementTree.fromstring(text).iter("joint"))
-    except (ElementTree.ParseError, ValueError):
-        return
-    for joint in joints:
-        parent, child, origin = joint.find("parent"), joint.find("child"), joint.find("origin")
-        if parent is None or child is None:
+    root = description_root(text)
+    for joint in [] if root is None else root.iter("joint"):
+        parent, child, origin = joint.find("parent"), joint.find("child"), origin_of(joint)
+        if parent is None or child is None or origin is None:
             continue
-        place, turn = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        if origin is not None:
-            try:
-                place, turn = _vector(origin.get("xyz", "0 0 0")), _vector(origin.get("rpy", "0 0 0"))
-            except ValueError:  # neither three nor numbers
-                continue
+        place, turn = origin
         header = types["std_msgs/msg/Header"](
             types["builtin_interfaces/msg/Time"](0, 0), f"{robot}/{parent.get('link', '')}"
         )
         transform = types["geometry_msgs/msg/Transform"](
-            types["geometry_msgs/msg/Vector3"](*place), types["geometry_msgs/msg/Quaternion"](*quaternion(*turn))
+            types["geometry_msgs/msg/Vector3"](*place), types["geometry_msgs/msg/Quaternion"](*turn)
         )
         yield _transform(header, f"{robot}/{child.get('link', '')}", transform)
-
-
-def _vector(text: str) -> Vector:
-    x, y, z = (float(number) for number in text.split())
-    return (x, y, z)
 
 
 def _transform(header: Message, child: str, transform: Message) -> object:

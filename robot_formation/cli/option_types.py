@@ -35,6 +35,7 @@ def option_type(convert: Callable[[str], T], accepts: Callable[[T], bool], what:
 whole_number = option_type(int, lambda value: True, "a whole number")
 number = option_type(float, math.isfinite, "a number")
 positive_whole = option_type(int, lambda value: value >= 1, "a whole number above zero")
+port = option_type(int, lambda value: 0 <= value <= 65535, "a port, 0 to 65535")
 positive = option_type(float, lambda value: 0.0 < value < 1e9, "a number above 0")
 
 

@@ -21,9 +21,10 @@ from robot_formation.cli import (
     sweep,
     teach,
     test,
+    view,
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, compare, report, path, predict, record, play, info, recover, replay),
+    *(run, sweep, list_, analyze, compare, report, view, path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )

@@ -10,7 +10,6 @@ from robot_formation.network.shared_memory_space import require_space
 require_space()  # before the imports below load ROS
 
 from robot_formation.conversions.basics import (  # noqa: E402
-    MessageError,
     clock,
     diagnostics,
     from_cdr,
@@ -50,12 +49,15 @@ from robot_formation.conversions.motion import (  # noqa: E402
     read_pose,
 )
 from robot_formation.conversions.vision import (  # noqa: E402
-    BLOCK_DTYPE,
     blocks,
     camera_info,
     image,
-    read_blocks,
     read_grey_image,
+)
+from robot_formation.errors import MessageError  # noqa: E402
+from robot_formation.vision.recorded_messages import (  # noqa: E402
+    BLOCK_DTYPE,
+    read_blocks,
     read_image,
 )
 

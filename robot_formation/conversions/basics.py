@@ -12,14 +12,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String, UInt32
 
-from robot_formation.errors import FormationError
 from robot_formation.names import Message
 
 _NS = 1_000_000_000
-
-
-class MessageError(FormationError):
-    """A message can't be used; the text says why."""
 
 
 @cache

@@ -10,8 +10,9 @@ from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceSt
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import JointState
 
-from robot_formation.conversions.basics import MessageError, header
+from robot_formation.conversions.basics import header
 from robot_formation.drive.movement_system import WheelCommand
+from robot_formation.errors import MessageError
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import JOINTS, WHEELS
 

@@ -46,3 +46,15 @@ def rotate(orientation: Quaternion, vector: Vector) -> Vector:
     # v + w t + q x t with t = 2 q x v
     t_x, t_y, t_z = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
     return (a + w * t_x + y * t_z - z * t_y, b + w * t_y + z * t_x - x * t_z, c + w * t_z + x * t_y - y * t_x)
+
+
+def multiply(first: Quaternion, second: Quaternion) -> Quaternion:
+    """Orientation of a frame that has the orientation `second` in a frame with the orientation `first`."""
+    x, y, z, w = first
+    a, b, c, d = second
+    return (
+        w * a + x * d + y * c - z * b,
+        w * b - x * c + y * d + z * a,
+        w * c + x * b - y * a + z * d,
+        w * d - x * a - y * b - z * c,
+    )

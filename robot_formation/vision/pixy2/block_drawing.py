@@ -30,11 +30,16 @@ Drawing = npt.NDArray[np.uint8]
 
 
 def write_drawn(path: str | Path, picture: Picture, blocks: Iterable[Block]) -> None:
-    """Write the picture, three times as large, with the blocks' outlines, signatures and indices.
+    """Write what `drawn` draws.
 
     Raises:
         PictureError: if the file can't be written.
     """
+    _write(path, drawn(picture, blocks))
+
+
+def drawn(picture: Picture, blocks: Iterable[Block]) -> Drawing:
+    """Return the picture, three times as large, with the blocks' outlines, signatures and indices."""
     image = _enlarged(picture)
     listed = list(blocks)
     for block in listed:
@@ -44,7 +49,7 @@ def write_drawn(path: str | Path, picture: Picture, blocks: Iterable[Block]) -> 
     for block in listed:  # last, so that no outline crosses a label
         left, top, _, bottom = _corners(block)
         _label(image, f"s={block.signature:o} i={block.index}", left, top, bottom, _colour(block.signature))
-    _write(path, image)
+    return image
 
 
 def write_mask(path: str | Path, picture: Picture, matched: npt.NDArray[np.uint8]) -> None:

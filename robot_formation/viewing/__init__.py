@@ -1,0 +1,1 @@
+"""Runs to look at: what the cameras showed, where the robots truly were, and animations."""

@@ -1,0 +1,194 @@
+"""A recorded run at any of its instants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation import names
+from robot_formation.analysis.chain import pose_at_end
+from robot_formation.analysis.from_bag import record_of, run_messages
+from robot_formation.analysis.quantities import RunAnalysis, analyse
+from robot_formation.analysis.run_record import FollowerRecord
+from robot_formation.bag.definitions import jazzy_typestore
+from robot_formation.bag.errors import BagError
+from robot_formation.bag.formation_bag import FormationBag
+from robot_formation.bag.message_recorder import METADATA_NAME
+from robot_formation.geometry.se2 import Motion
+from robot_formation.names import Message
+from robot_formation.viewing.lens import Lens, read_lens
+from robot_formation.viewing.moment import FollowerNow, Forecast, Moment, RobotPose, TimestepFigures
+from robot_formation.viewing.robot_shape import Link, read_shape
+from robot_formation.viewing.true_poses import TruePoses
+
+_POSE_PERIOD_NS = 100_000_000
+"""Poses of one motion are not farther apart; the world's are a twentieth of a second."""
+
+
+class RunMoments:
+    """A run in an open bag.
+
+    Attributes:
+        record: what the analysis reads.
+        shapes: links of each robot.
+        lenses: of each follower's camera, where the bag tells it.
+        start_ns: simulated time of the first true pose.
+        end_ns: of the last one, or of what a follower said last.
+    """
+
+    def __init__(self, bag: FormationBag) -> None:
+        """Read the run, but neither wheels nor pictures yet.
+
+        Raises:
+            BagError: the bag is corrupted, a topic has another message type than a run's, or there are no true poses.
+            AnalysisError: the bag has no run of a formation.
+        """
+        robots, messages, stamps = run_messages(bag)
+        self.record = record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
+        odometry = {robot: messages[names.ground_truth_odom(robot).of()] for robot in robots}
+        self._poses = {robot: TruePoses(found, _POSE_PERIOD_NS) for robot, found in odometry.items() if found}
+        if not self._poses:
+            topic = names.ground_truth_odom(names.LEADER).of()
+            raise BagError(f"{bag.path} tells no true poses, which a view is made of; record '{topic}' and the like")
+        self._bag = bag
+        self.shapes = {robot: read_shape(self._text(names.robot_description(robot).of())) for robot in self._poses}
+        lenses = {robot: self._lens(names.camera_info(robot).of()) for robot in self._poses}
+        self.lenses = {robot: lens for robot, lens in lenses.items() if lens is not None}
+        self.start_ns = min(int(found.stamps_ns[0]) for found in self._poses.values())
+        ends = [int(found.stamps_ns[-1]) for found in self._poses.values()]
+        ends += [follower.state_stamps_ns[-1] for follower in self.record.followers if follower.state_stamps_ns]
+        self.end_ns = max(ends)
+
+    @property
+    def title(self) -> str:
+        """What was run, for people."""
+        details = self.record.details
+        parts = [details.get("scenario") or "formation run", details.get("predictor", ""), details.get("surface", "")]
+        parts.append(f"seed {details['seed']}" if details.get("seed") else "")
+        return " · ".join(part for part in parts if part)
+
+    @property
+    def robots(self) -> list[str]:
+        """Robots with true poses, the leader first."""
+        return list(self._poses)
+
+    @cached_property
+    def analysis(self) -> RunAnalysis:
+        """The run's quantities."""
+        return analyse(self.record)
+
+    @cached_property
+    def figures(self) -> dict[str, tuple[TimestepFigures, ...]]:
+        """Each follower's finished timesteps."""
+        return {
+            follower.name: tuple(
+                TimestepFigures(t.t, t.corrections.u_m + t.corrections.v_m, t.formation_error_m)
+                for t in follower.timesteps
+            )
+            for follower in self.analysis.followers
+        }
+
+    def path(self, robot: str, most: int = 2000) -> NDArray[np.float64]:
+        """Return a robot's path (n, 3), metres, thinned to so many places."""
+        places = self._poses[robot].positions_m
+        return places[np.unique(np.linspace(0, len(places) - 1, min(most, len(places))).round().astype(int))]
+
+    def instants(self, most: int, period_ns: int = _POSE_PERIOD_NS) -> list[int]:
+        """List instants from the run's start to its end at which a moving robot is to be shown: at most so many."""
+        return np.arange(self.start_ns, self.end_ns + 1, max(period_ns, self.duration_ns // most)).tolist()
+
+    @property
+    def duration_ns(self) -> int:
+        """Simulated time from start to end."""
+        return self.end_ns - self.start_ns
+
+    def at(self, stamp_ns: int) -> Moment:
+        """Return what is the case at an instant."""
+        robots = {}
+        for robot, poses in self._poses.items():
+            pose = poses.at(stamp_ns)
+            robots[robot] = RobotPose(pose.position, pose.orientation, self._joints[robot].at(stamp_ns))
+        return Moment(stamp_ns, robots, {f.name: self._follower(f, stamp_ns) for f in self.record.followers})
+
+    @cached_property
+    def _joints(self) -> dict[str, _Joints]:
+        return {robot: _Joints(self._bag, names.joint_states(robot).of()) for robot in self._poses}
+
+    def _follower(self, follower: FollowerRecord, stamp_ns: int) -> FollowerNow:
+        states = int(np.searchsorted(follower.state_stamps_ns, stamp_ns, side="right"))
+        finished = _count([d.stamp_ns for d in follower.displacements], stamp_ns)
+        place = self._place(follower.name, finished, stamp_ns)
+        return FollowerNow(
+            follower.states[states - 1] if states else "", finished, place, self._forecast(follower, stamp_ns)
+        )
+
+    def _place(self, robot: str, finished: int, stamp_ns: int) -> Motion | None:
+        neighbour = names.beacon_neighbour(robot)
+        if self.record.delayed:
+            pose = pose_at_end(self.record, neighbour, finished)
+        else:
+            track = self.record.tracks.get(neighbour)
+            pose = None if track is None else track.at(stamp_ns)
+        return None if pose is None else pose.then(Motion(y_m=-self.record.formation_distance_m))
+
+    def _forecast(self, follower: FollowerRecord, stamp_ns: int) -> Forecast | None:
+        count = _count([prediction.stamp_ns for prediction in follower.predictions], stamp_ns)
+        track = self.record.tracks.get(follower.name)
+        told = follower.predictions[count - 1] if count else None
+        start = None if track is None or told is None else track.at(told.stamp_ns)
+        if told is None or start is None or not told.motion.finite:
+            return None
+        return Forecast(start, told.motion, told.covariance_uv)
+
+    def _text(self, topic: str) -> str:
+        if topic not in self._bag.topics:
+            return ""
+        self._bag.require({topic: names.robot_description("").type})
+        return str(next(iter(self._bag.messages([topic]))).message.data)
+
+    def _lens(self, topic: str) -> Lens | None:
+        if topic not in self._bag.topics:
+            return None
+        self._bag.require({topic: names.camera_info().type})
+        return read_lens(next(iter(self._bag.messages([topic]))).message)
+
+
+class _Joints:
+    """Angles of a robot's joints, decoded when they are asked for: a long run has tens of thousands."""
+
+    def __init__(self, bag: FormationBag, topic: str) -> None:
+        found = []
+        if topic in bag.topics:
+            bag.require({topic: names.joint_states().type})
+            found = list(bag.raw_messages([topic]))
+        self._stamps_ns = np.array([message.stamp_ns for message in found], dtype=np.int64)
+        self._cdr = [message.cdr for message in found]
+        self._topic, self._last = topic, (-1, dict[str, float]())
+
+    def at(self, stamp_ns: int) -> dict[str, float]:
+        """Return the angles by joint, radians, that were told last; none before the first."""
+        index = int(np.searchsorted(self._stamps_ns, stamp_ns, side="right")) - 1
+        if index != self._last[0]:
+            self._last = index, self._decoded(index) if index >= 0 else {}
+        return self._last[1]
+
+    def _decoded(self, index: int) -> dict[str, float]:
+        try:
+            message: Message = jazzy_typestore().deserialize_cdr(self._cdr[index], names.joint_states().type)
+        except Exception as error:  # rosbags' decoders have no common error
+            raise BagError(f"'{self._topic}' holds a message that can't be read: {error}") from error
+        return finite_angles(message.name, message.position)
+
+
+def finite_angles(joints: Iterable[str], positions: Iterable[float]) -> dict[str, float]:
+    """Return the angles that are numbers, by joint."""
+    return {joint: float(angle) for joint, angle in zip(joints, positions, strict=False) if math.isfinite(angle)}
+
+
+def _count(stamps_ns: Sequence[int], until_ns: int) -> int:
+    """Return how many stamps there are until an instant."""
+    return int(np.searchsorted(np.asarray(stamps_ns, dtype=np.int64), until_ns, side="right"))

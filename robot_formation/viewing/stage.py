@@ -1,0 +1,227 @@
+"""Robots, ground and what goes with them as a scene of viser."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation import names
+from robot_formation.analysis.run_record import Ground
+from robot_formation.geometry.orientation import Quaternion, Vector
+from robot_formation.geometry.se2 import Motion
+from robot_formation.viewing.ground_lines import GroundHeight, contour_lines
+from robot_formation.viewing.lens import Lens
+from robot_formation.viewing.moment import Forecast, Moment, Picture, RobotPose
+from robot_formation.viewing.robot_shape import Link, Part, Rgb
+
+# Okabe and Ito's palette, safe for colour-blind readers; leader orange as in the pictures of the analysis.
+_LEADER_RGB: Rgb = (230, 159, 0)
+_FOLLOWER_RGB: tuple[Rgb, ...] = ((0, 114, 178), (0, 158, 115), (204, 121, 167), (86, 180, 233))
+_GROUND_RGB: Rgb = (206, 210, 200)
+_LOW_RGB, _HIGH_RGB = np.array((70, 90, 120)), np.array((190, 120, 60))
+_LIFT_M = 0.003
+"""Lines lie so far above the ground, so that it doesn't hide them."""
+_LINE_M = 0.004
+_CONE_M = 0.28
+_LABEL_M = 0.29
+_PICTURE_QUALITY = 70
+_SPOKE_RGB: Rgb = (190, 190, 190)
+_RING_M = 0.035
+
+
+def robot_rgb(robot: str) -> Rgb:
+    """Return the colour that a robot's path, place and name have."""
+    if robot == names.LEADER:
+        return _LEADER_RGB
+    number = robot.rpartition("_")[2]
+    return _FOLLOWER_RGB[(int(number) - 1) % len(_FOLLOWER_RGB) if number.isdigit() else 0]
+
+
+class Stage:
+    """Draws in a viser server: what stands still once, what moves with each `show`, and only what has changed.
+
+    Args:
+        server: viser's ViserServer.
+    """
+
+    def __init__(self, server: Any) -> None:
+        self._server, self._scene = server, server.scene
+        self._height = GroundHeight()
+        self._frames: dict[str, Any] = {}
+        self._joints: dict[str, list[Link]] = {}
+        self._cameras: dict[str, Any] = {}
+        self._places: dict[str, Any] = {}
+        self._forecasts: dict[str, tuple[Forecast | None, Any]] = {}
+        self._shown: dict[str, tuple[float, ...]] = {}
+        self._scene.world_axes.visible = False
+
+    def ground(self, ground: Ground) -> None:
+        """Draw the ground with its contour lines, and look at it as a whole."""
+        self._height = GroundHeight(ground)
+        self._scene.add_mesh_simple(
+            "/ground/mesh", ground.vertices_m, ground.triangles, color=_GROUND_RGB, side="double", cast_shadow=False
+        )
+        contours = contour_lines(ground)
+        for number, (_, segments) in enumerate(contours):
+            share = number / max(1, len(contours) - 1)
+            rgb = np.rint(_LOW_RGB + share * (_HIGH_RGB - _LOW_RGB)).astype(np.uint8)
+            lifted = segments + (0.0, 0.0, _LIFT_M)
+            self._scene.add_line_segments(f"/ground/contour_{number}", lifted, rgb, thickness=0.5 * _LINE_M)
+        self.look_at(ground.vertices_m)
+
+    def look_at(self, points_m: NDArray[np.float64]) -> None:
+        """Let browsers that open the page look at points (n, 3) from the right and behind, from above."""
+        low, high = points_m.min(axis=0), points_m.max(axis=0)
+        middle, size = 0.5 * (low + high), max(0.5, float(np.linalg.norm((high - low)[:2])))
+        camera = self._server.initial_camera
+        camera.look_at = tuple(middle.tolist())
+        camera.position = tuple((middle + size * np.array((0.42, -0.55, 0.5))).tolist())
+        camera.fov = math.radians(50.0)
+
+    def robot(self, robot: str, links: Sequence[Link]) -> None:
+        """Draw a robot, or anew if its description has changed."""
+        frame = self._scene.add_frame(f"/robots/{robot}", show_axes=False)
+        self._frames[robot] = frame
+        self._joints[robot] = [link for link in links if link.axis is not None]
+        for link in links:
+            path = f"/robots/{robot}/{link.name}"
+            self._frames[path] = self._scene.add_frame(
+                path, show_axes=False, position=link.place_m, wxyz=_wxyz(link.turn)
+            )
+            for number, part in enumerate(link.parts):
+                self._part(f"{path}/{number}", part)
+                if link.axis is not None and not part.is_box:
+                    self._spokes(f"{path}/spokes_{number}", part)
+        label = robot.replace("_", " ")
+        self._scene.add_label(f"/robots/{robot}/name", label, position=(0.0, 0.0, _LABEL_M), font_screen_scale=0.8)
+        self._shown = {key: value for key, value in self._shown.items() if not key.startswith(f"/robots/{robot}/")}
+        self._shown.pop(f"/robots/{robot}", None)
+
+    def camera(self, robot: str, lens: Lens) -> None:
+        """Draw a robot's camera as a cone, where it has one."""
+        optical = f"/robots/{robot}/{names.OPTICAL_FRAME}"
+        if optical in self._frames:
+            self._cameras[robot] = self._scene.add_camera_frustum(
+                f"{optical}/cone",
+                lens.fov_rad,
+                lens.aspect,
+                scale=_CONE_M,
+                thickness=0.5 * _LINE_M,
+                color=robot_rgb(robot),
+                jpeg_quality=_PICTURE_QUALITY,
+                cast_shadow=False,
+            )
+
+    def path(self, robot: str, points_m: NDArray[np.float64]) -> None:
+        """Draw the way (n, 3) that a robot's base_link takes."""
+        if len(points_m) > 1:
+            lifted = points_m + (0.0, 0.0, _LIFT_M)
+            self._segments(f"/paths/{robot}", np.stack([lifted[:-1], lifted[1:]], axis=1), robot_rgb(robot))
+
+    def picture(self, robot: str, picture: Picture) -> None:
+        """Show what a robot's camera saw at the end of its cone."""
+        if robot in self._cameras:
+            self._cameras[robot].image = picture
+
+    def show(self, moment: Moment) -> None:
+        """Move everything to where it is at an instant."""
+        with self._server.atomic():
+            for robot, pose in moment.robots.items():
+                self._move(robot, pose)
+            for robot, now in moment.followers.items():
+                self._place(robot, now.place)
+                self._forecast(robot, now.forecast)
+
+    def _move(self, robot: str, pose: RobotPose) -> None:
+        if robot not in self._frames:
+            return
+        self._put(f"/robots/{robot}", self._frames[robot], pose.position_m, pose.orientation)
+        for link in self._joints[robot]:
+            path = f"/robots/{robot}/{link.name}"
+            turn = link.turned(pose.joints_rad.get(link.name, 0.0))
+            self._put(path, self._frames[path], link.place_m, turn)
+
+    def _put(self, key: str, handle: Any, place_m: Vector, turn: Quaternion) -> None:
+        """Set what differs from what browsers have, to a tenth of a millimetre and of a milliradian."""
+        pose = (*(round(value, 4) for value in place_m), *(round(value, 4) for value in turn))
+        before = self._shown.get(key, ())
+        if pose[:3] != before[:3]:
+            handle.position = pose[:3]
+        if pose[3:] != before[3:]:
+            handle.wxyz = _wxyz((pose[3], pose[4], pose[5], pose[6]))
+        self._shown[key] = pose
+
+    def _place(self, robot: str, place: Motion | None) -> None:
+        key = f"/places/{robot}"
+        if place is None:
+            return
+        if key not in self._places:
+            self._places[key] = self._segments(key, _ring(), robot_rgb(robot))
+        (height,) = self._height.of(np.array([[place.x_m, place.y_m]])).tolist()
+        self._put(key, self._places[key], (place.x_m, place.y_m, height + 2 * _LIFT_M), _about_z(place.yaw_rad))
+
+    def _forecast(self, robot: str, forecast: Forecast | None) -> None:
+        shown, handle = self._forecasts.get(robot, (None, None))
+        if forecast is None or forecast == shown:
+            if handle is not None and forecast is None and shown is not None:
+                handle.visible = False
+                self._forecasts[robot] = (None, handle)
+            return
+        segments = self._forecast_lines(forecast)
+        if handle is None:
+            handle = self._segments(f"/forecasts/{robot}", segments, (0, 0, 0))
+        else:
+            handle.points = segments.astype(np.float32)
+            handle.visible = True
+        self._forecasts[robot] = (forecast, handle)
+
+    def _forecast_lines(self, forecast: Forecast) -> NDArray[np.float64]:
+        """Return the displacement, a cross where it ends, and the ellipse around it, (n, 2, 3)."""
+        start, end = forecast.start, forecast.end
+        arm = 0.25 * _RING_M
+        places = [[(start.x_m, start.y_m), (end.x_m, end.y_m)]]
+        places += [[(end.x_m - x, end.y_m - y), (end.x_m + x, end.y_m + y)] for x, y in ((arm, arm), (arm, -arm))]
+        ellipse = forecast.ellipse()
+        flat = np.concatenate([np.array(places), np.stack([ellipse[:-1], ellipse[1:]], axis=1)])
+        return self._height.on_ground(flat.reshape(-1, 2), 3 * _LIFT_M).reshape(-1, 2, 3)
+
+    def _segments(self, path: str, segments: NDArray[np.float64], rgb: Rgb) -> Any:
+        return self._scene.add_line_segments(path, segments.astype(np.float32), rgb, thickness=_LINE_M)
+
+    def _part(self, path: str, part: Part) -> None:
+        where: Mapping[str, Any] = {"position": part.place_m, "wxyz": _wxyz(part.turn), "color": part.rgb}
+        if part.is_box:
+            self._scene.add_box(path, dimensions=part.size_m, **where)
+        else:
+            radius, length = part.size_m
+            self._scene.add_cylinder(path, radius, length, radial_segments=24, **where)
+
+    def _spokes(self, path: str, part: Part) -> None:
+        """Draw a bar across a wheel, a little longer than the wheel is wide: a plain cylinder doesn't show its turn."""
+        radius, length = part.size_m
+        size = (1.7 * radius, 0.3 * radius, 1.04 * length)
+        self._scene.add_box(
+            path, dimensions=size, position=part.place_m, wxyz=_wxyz(part.turn), color=_SPOKE_RGB, cast_shadow=False
+        )
+
+
+def _wxyz(orientation: Quaternion) -> Quaternion:
+    """Order the components of an orientation as viser does."""
+    x, y, z, w = orientation
+    return (w, x, y, z)
+
+
+def _about_z(angle_rad: float) -> Quaternion:
+    return (0.0, 0.0, math.sin(0.5 * angle_rad), math.cos(0.5 * angle_rad))
+
+
+def _ring() -> NDArray[np.float64]:
+    """Return a place's sign: a ring, and a bar that tells the heading (x), (n, 2, 3) metres."""
+    angles = np.linspace(0.0, math.tau, 37)
+    circle = _RING_M * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(37)])
+    heading = np.array([[(_RING_M, 0.0, 0.0), (1.7 * _RING_M, 0.0, 0.0)]])
+    return np.concatenate([np.stack([circle[:-1], circle[1:]], axis=1), heading])
