@@ -33,6 +33,7 @@ a { color: var(--link); }
 .quiet, figcaption, caption { color: var(--quiet); font-size: 0.9rem; }
 .answer { font-weight: 600; }
 figure { margin: 1rem 0; }
+iframe { display: block; width: 100%; height: 44rem; border: 1px solid var(--line); border-radius: 6px; }
 .drawing svg { display: block; width: 100%; height: auto; max-width: 44rem; }
 .scroll { overflow-x: auto; margin: 0.75rem 0; border: 1px solid var(--line); border-radius: 6px; }
 .scroll:focus-visible { outline: 2px solid var(--link); }

@@ -36,17 +36,19 @@ class Repetition:
 
 
 def repetition(details: Mapping[str, str]) -> Repetition | None:
-    """Find the command that repeats a run; None where it doesn't say its parameters, or none makes today's of them."""
+    """Find the command that repeats a run; None where it doesn't say its parameters, or they can't be run today."""
     nodes = node_parameters(details)
     if any(kind not in nodes for kind in KINDS):
         return None
     try:
-        return _found(details, nodes)
+        found, scenario = _found(details, nodes)
+        scenario.check()
+        return found
     except (FormationError, KeyError, TypeError, ValueError, IndexError, OverflowError):
         return None  # parameters from outside, which may be anything
 
 
-def _found(details: Mapping[str, str], nodes: dict[str, JsonObject]) -> Repetition:
+def _found(details: Mapping[str, str], nodes: dict[str, JsonObject]) -> tuple[Repetition, Scenario]:
     name = details.get("scenario", "")
     track = name.removeprefix(_PRESET)
     preset = track if name.startswith(_PRESET) and track in scenarios.track_names() else _DEFAULT_TRACK
@@ -66,7 +68,7 @@ def _found(details: Mapping[str, str], nodes: dict[str, JsonObject]) -> Repetiti
     own = scenario.by_node()
     gone = [f"{node}.{name}" for node in KINDS for name in nodes[node] if name not in own[node]]
     missed = (*(name for name, _ in _other(nodes, scenario)), *gone)
-    return Repetition(shlex.join([*words, *_as_options(settings)]), missed)
+    return Repetition(shlex.join([*words, *_as_options(settings)]), missed), scenario
 
 
 def _setup(name: str, nodes: dict[str, JsonObject], preset: Scenario) -> list[str]:

@@ -18,6 +18,7 @@ from robot_formation.reporting.differences import value_text
 from robot_formation.reporting.inline_svg import figure
 from robot_formation.reporting.markup import element, paragraph, section, table
 from robot_formation.reporting.repetition import repetition
+from robot_formation.reporting.replay import replay_section
 from robot_formation.reporting.runs import Run
 from robot_formation.reporting.words import answer, how_it_was_held, what_was_run
 
@@ -40,6 +41,7 @@ def run_sections(run: Run, folder: Path, level: int) -> Iterator[Element]:
     key = [_key_figures(follower) for follower in followers[:1]]
     yield section("Did it hold the formation?", paragraph(answer(run), class_="answer"), *key, *held, level=level)
     yield section("Corrections and errors", *_figures(run, folder), level=level)
+    yield replay_section(run, level)
     yield section("Timesteps", *(_timesteps(follower) for follower in followers), level=level)
     yield section("Totals", *_totals(run), level=level)
     yield section("Parameters that differ from the defaults", *_parameters(run), level=level)
@@ -166,7 +168,8 @@ def _with_unit(text: str, unit: str) -> str:
 def _repeat(run: Run) -> Iterator[Element]:
     found = repetition(run.record.details)
     if found is None:
-        yield paragraph("The run does not tell all of its parameters, so no command can be given that repeats it.")
+        why = "the run does not tell all of its parameters, or this version can't run them"
+        yield paragraph(f"No command can be given that repeats this run: {why}.")
         return
     yield element("pre", element("code", found.command), tabindex="0")
     if found.missed:

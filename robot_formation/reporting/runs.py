@@ -29,12 +29,14 @@ class Run:
         bag: as it was given.
         record: what is known of it.
         analysis: its quantities.
+        namespace: where the formation lies in the bag, as it was given.
     """
 
     number: int
     bag: Path
     record: RunRecord
     analysis: RunAnalysis
+    namespace: str | None = None
 
     @property
     def label(self) -> str:
@@ -81,7 +83,7 @@ def load_runs(bags: Sequence[Path], namespace: str | None = None) -> list[Run]:
     runs = []
     for number, bag in enumerate(bags, 1):
         record = load_run(bag, namespace)
-        runs.append(Run(number, bag, record, analyse(record)))
+        runs.append(Run(number, bag, record, analyse(record), namespace))
     return runs
 
 

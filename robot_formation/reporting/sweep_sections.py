@@ -76,7 +76,8 @@ def sweep_sections(sweep: Sweep, folder: Path, level: int) -> Iterator[Element]:
         entries = [entry for entry in summary if group_name(entry) == name]
         shown = _distribution(f"sweep-{sweep.number}-{number}", name, rows, entries, seeds, folder)
         yield section(name.capitalize(), shown, _table(name, entries), level=level)
-    yield section("Repeat this sweep", *_repeat(sweep.plan), level=level)
+    command = element("pre", element("code", repeating_command(sweep.plan)), tabindex="0")
+    yield section("Repeat this sweep", command, level=level)
     yield section("Versions", *_versions(), level=level)
 
 
@@ -171,14 +172,15 @@ def _interval(found: dict[str, float | None] | None, scale: float, digits: int) 
     return f"{middle} ({low} to {high})"
 
 
-def _repeat(plan: Plan) -> Iterator[Element]:
+def repeating_command(plan: Plan) -> str:
+    """Return the command that repeats a sweep, for a shell."""
     words = ["formation", "sweep", "--tracks", ",".join(plan.tracks), "--surfaces", ",".join(plan.surfaces)]
     if plan.paths != (STRAIGHT,):
         words += ["--paths", ",".join(plan.paths)]
     words += ["--predictors", ",".join(plan.predictors), "--seeds", _seeds(plan.seeds)]
     for setting in plan.settings:
         words += ["--set", setting]
-    yield element("pre", element("code", shlex.join(words)), tabindex="0")
+    return shlex.join(words)
 
 
 def _seeds(chosen: Sequence[int]) -> str:
