@@ -16,6 +16,7 @@ NODES = (
     "recorder",
     "player",
     "progress",
+    "viewer",
 )
 
 
@@ -61,6 +62,8 @@ setup(
     extras_require={
         # ROS 2 Jazzy where none is installed. Not among the requirements: a ROS install brings its own.
         "pip": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
+        # Runs in three dimensions in a browser. From 1.1 on lines have a width in metres.
+        "view": ["viser>=1.1.0"],
         # Sweeps on many machines.
         "dask": ["dask[distributed]"],
         "test": [

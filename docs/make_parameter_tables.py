@@ -24,6 +24,7 @@ from robot_formation.nodes.host.ros_parameters import AT_START, HostParameters, 
 from robot_formation.nodes.player.player_node import PlayerNode, PlayerParameters
 from robot_formation.nodes.progress.progress_node import ProgressExecutable, ProgressParameters
 from robot_formation.nodes.recorder.recorder_node import RecorderNode, RecorderParameters
+from robot_formation.nodes.viewer.viewer_node import ViewerExecutable, ViewerParameters
 from robot_formation.parameters import Spec, specs
 
 SCHEMA = Path(__file__).parents[1] / "config" / "scenario.schema.json"
@@ -45,7 +46,12 @@ _TYPES: dict[Any, str] = {
 def parameter_classes() -> dict[str, type]:
     """List the parameter class of every page, by the page's name."""
     classes = {name: kind.parameter_class() for name, kind in KINDS.items()}
-    others = {"recorder": RecorderParameters, "player": PlayerParameters, "progress": ProgressParameters}
+    others: dict[str, type] = {
+        "recorder": RecorderParameters,
+        "player": PlayerParameters,
+        "progress": ProgressParameters,
+        "viewer": ViewerParameters,
+    }
     return {**classes, **others, COMMON: HostParameters}
 
 
@@ -53,7 +59,12 @@ def fixed_parameters(name: str) -> Mapping[str, str]:
     """List why parameters of a page can't be set while the node runs, by shell pattern."""
     if name in KINDS:
         return KINDS[name].component_class().fixed
-    others = {"recorder": RecorderNode.fixed, "player": PlayerNode.fixed, "progress": ProgressExecutable.fixed}
+    others = {
+        "recorder": RecorderNode.fixed,
+        "player": PlayerNode.fixed,
+        "progress": ProgressExecutable.fixed,
+        "viewer": ViewerExecutable.fixed,
+    }
     return {**others, COMMON: {"*": AT_START}}[name]
 
 

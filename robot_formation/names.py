@@ -17,8 +17,14 @@ Message: TypeAlias = Any
 
 LEADER = "leader"
 PROGRESS = "progress"
-"""Name of the node that tells the progress of a launched run: it listens, and nothing of the run needs it."""
+"""Name of the node that tells the progress of a launched run."""
+VIEWER = "viewer"
+"""Name of the node that shows a run in a browser."""
+ONLOOKERS = frozenset({PROGRESS, VIEWER})
+"""Nodes that listen, and nothing of a run needs them."""
 FORMATION = "/formation"
+PAUSED = "paused"
+"""Key of the diagnostics by which the world tells whether it is paused."""
 
 WORLD_FRAME = "world"
 BASE_FRAME = "base_link"

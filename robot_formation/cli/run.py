@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robot_formation import exit_codes
-from robot_formation.cli.option_types import number, whole_number
+from robot_formation.cli.option_types import number, port, whole_number
 from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 from robot_formation.json_values import JsonObject
@@ -65,6 +65,8 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--camera", metavar="MODE", help="stream (every frame, default) or on_demand (requested frames)"
     )
+    parser.add_argument("--view", action="store_true", help="show the run in 3-D in a browser of this machine")
+    parser.add_argument("--view-port", metavar="N", type=port, help="port of --view (default: 8080; 0: any free one)")
     parser.add_argument("--in-process", action="store_true", help="the same run in one process, without ROS middleware")
     parser.add_argument(
         "--json", action="store_true", help="print JSON and nothing else on standard output; no pictures"
@@ -83,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
     tracing = TracingFiles()  # before anything of ROS is loaded
     try:
         scenario = build_scenario(args)
+        check_view(args)
         with reserve(args, scenario) as place:
             result = execute(args, scenario, place)
     finally:
@@ -142,6 +145,22 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
     return scenario
 
 
+def check_view(args: argparse.Namespace) -> None:
+    """Check that the run can be shown, if that is asked for.
+
+    Raises:
+        FormationError: it runs in one process, viser is missing, or the port can't be used.
+    """
+    if args.view:
+        if args.in_process:
+            raise FormationError(
+                "--view shows the node graph; leave --in-process out, or see 'formation view BAG' later"
+            )
+        from robot_formation.viewing.browser import DEFAULT_PORT, check_viewer
+
+        args.view_port = check_viewer(DEFAULT_PORT if args.view_port is None else args.view_port)
+
+
 def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
     """Reserve the bag's path: as asked for, else a new name after the run and the time."""
     from robot_formation.bag.bag_path import PathReservation, reserve_new
@@ -177,7 +196,8 @@ def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation
         )
     from robot_formation.launching.launcher import Launcher
 
-    return Launcher(scenario, place.path, images=args.images, say=say, reservation=place).run()
+    view_port = args.view_port if args.view else None
+    return Launcher(scenario, place.path, args.images, say, reservation=place, view_port=view_port).run()
 
 
 def report(args: argparse.Namespace, result: RunResult) -> None:

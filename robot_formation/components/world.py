@@ -166,7 +166,7 @@ class WorldComponent(Component):
         return {
             "simulated time [s]": f"{self._world.stamp_ns / 1e9:.3f}",
             "owes": str(self._world.owes),
-            "paused": str(self._paused),
+            names.PAUSED: str(self._paused),
             "waits for": ", ".join(self._awaited.names()),
         }
 

@@ -91,8 +91,21 @@ class Progress:
         formation_distance_m: float = FORMATION_DISTANCE_M,
         *,
         delayed: bool = False,
+        tell: Callable[[str, int, float, float], None] | None = None,
     ) -> None:
+        """Begin.
+
+        Args:
+            followers: their number.
+            timesteps: of the run, for the lines.
+            say: takes the lines.
+            elapsed: seconds since the beginning, for the lines.
+            formation_distance_m: the fine-tuners'.
+            delayed: whether places are those of one timestep earlier.
+            tell: takes what a line says: follower, timestep, correction distance and formation error in metres.
+        """
         self._delayed = delayed
+        self._tell_figures = tell
         self._timesteps = timesteps
         self._say = say
         self._elapsed = elapsed
@@ -189,6 +202,8 @@ class Progress:
         correction_m = sum(abs(move.x_m) + abs(move.y_m) for move in corrections)
         place = neighbour.then(self._place)
         error_m = math.hypot(own.x_m - place.x_m, own.y_m - place.y_m)
+        if self._tell_figures is not None:
+            self._tell_figures(robot, timestep, correction_m, error_m)
         who = f"{robot}  " if len(self._followers) > 1 else ""
         self._say(
             f"{who}timestep {timestep:2d}/{self._timesteps}  correction {correction_m * 100:5.1f} cm  "

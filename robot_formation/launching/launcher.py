@@ -21,9 +21,11 @@ from robot_formation.launching.child import Child
 from robot_formation.launching.environment import node_environment
 from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
 from robot_formation.launching.outcome import recorder_failed, verdict
-from robot_formation.launching.processes import RECORDER, Process, processes
+from robot_formation.launching.processes import RECORDER, Process, processes, viewer
+from robot_formation.launching.view_announcement import Announcement
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
 from robot_formation.leader.paths import Teleop
+from robot_formation.names import ONLOOKERS
 from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, is_of_domain
 from robot_formation.schedule.schedules import Spacing
@@ -79,6 +81,7 @@ class Launcher:
         say: takes the lines of progress.
         silence_s: wall seconds in which no robot does anything, after which the run is given up; longer in slow motion.
         reservation: of the bag's path, if it has been taken already; it is released at the end.
+        view_port: where a viewer serves; None for no viewer. The run goes on without a viewer that has died.
     """
 
     scenario: Scenario
@@ -87,6 +90,7 @@ class Launcher:
     say: Callable[[str], None] = lambda text: None
     silence_s: float = 90.0
     reservation: PathReservation | None = None
+    view_port: int | None = None
     _children: list[Child] = field(default_factory=list, init=False)
     _signals: SignalCounter = field(default_factory=SignalCounter, init=False)
     _said_at: float = field(default=0.0, init=False)
@@ -134,6 +138,10 @@ class Launcher:
     def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""
         table = processes(self.scenario, self.bag, images=self.images)
+        announcement = None
+        if self.view_port is not None:
+            table.append(viewer(self.scenario, self.view_port))
+            announcement = Announcement(self.view_port, self._tell)
         self._tell(f"starting {len(table)} nodes ...")
         from robot_formation.nodes.progress.monitor import Monitor  # here, since it needs the environment of the wheels
 
@@ -154,14 +162,16 @@ class Launcher:
             except NodeNotStartedError as error:
                 interrupted = bool(self._signals.count)
                 return (exit_codes.INTERRUPTED, "interrupted") if interrupted else (exit_codes.NODE_DIED, str(error))
-            watchdog = Watchdog([child.name for child in self._children], idle_s=self._patience_s())
+            watchdog = Watchdog([child.name for child in self._needed], idle_s=self._patience_s())
             while True:
                 monitor.spin(_POLL_S)
+                if announcement is not None:
+                    announcement.look()
                 if monitor.messages and not result.startup_s:
                     result.startup_s = time.monotonic() - began
                 if self._signals.count:
                     return exit_codes.INTERRUPTED, "interrupted"
-                ended = next((child for child in self._children if child.poll() is not None), None)
+                ended = self._first_ended()
                 if ended is not None:
                     monitor.drain(_POLL_S, lambda: progress.complete)
                     return self._ended_by(ended, monitor)
@@ -172,6 +182,19 @@ class Launcher:
                 if time.monotonic() - self._said_at > _REMIND_S:
                     progress.remind()
 
+    @property
+    def _needed(self) -> list[Child]:
+        """The nodes without which the run can't go on."""
+        return [child for child in self._children if child.process.executable not in ONLOOKERS]
+
+    def _first_ended(self) -> Child | None:
+        """Return a node whose end ends the run: one that it needs, or one that can't be started as it was asked for."""
+        for child in self._children:
+            refused = child.poll() == exit_codes.BAD_INPUT
+            if child.exit_code is not None and (refused or child in self._needed):
+                return child
+        return None
+
     def _ended_by(self, ended: Child, monitor: Monitor) -> tuple[int, str]:
         """Judge a node's end, which ends the run, by the others' states; then let those that are stopped go on."""
         try:
@@ -180,8 +203,8 @@ class Launcher:
             self._resume(monitor)
 
     def _look(self, watchdog: Watchdog, monitor: Monitor) -> str:
-        states = {child.name: child.state for child in self._children}
-        return watchdog.look(states, monitor.reports, monitor.messages)
+        states = {child.name: child.state for child in self._needed}
+        return watchdog.look(states, monitor.reports, monitor.messages + monitor.pauses)
 
     def _resume(self, monitor: Monitor) -> None:
         """Let stopped nodes go on, so that they end in good order; a recorder first takes what was kept for it."""
@@ -208,7 +231,7 @@ class Launcher:
             raise RunError(f"{ended.name}: {ended.last_words()}")
         if code == exit_codes.DONE:
             # What such a node had still to do is missing.
-            stopped = next((child for child in self._children if child.state == STOPPED), None)
+            stopped = next((child for child in self._needed if child.state == STOPPED), None)
             return (exit_codes.NODE_DIED, stopped_text(stopped.name)) if stopped else (exit_codes.DONE, "")
         if code == exit_codes.LOST:
             return exit_codes.LOST, ended.last_words()
@@ -239,7 +262,9 @@ class Launcher:
                 if child.exit_code in _ORDERLY and not failed:
                     continue
                 how = "had to be killed, since it did not end when it was asked to" if child.forced else child.death
-                if failed:
+                if child not in self._needed:
+                    result.warnings.append(f"node {child.name} {how}; the run does not need it")
+                elif failed:
                     result.exit_code, result.reason = exit_codes.NODE_DIED, f"node {child.name} {how}"
                 else:
                     result.warnings.append(f"node {child.name} {how}, after the run's end")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from robot_formation import exit_codes
 from robot_formation.launching.processes import RECORDER
-from robot_formation.names import PROGRESS
+from robot_formation.names import ONLOOKERS
 
 _WORDS = {exit_codes.DONE: "done", exit_codes.LOST: "lost", exit_codes.INTERRUPTED: "interrupted"}
 
@@ -61,7 +61,7 @@ class LaunchedRun:
             stopping: whether everything that was launched had been told to end.
         """
         self._ended += 1
-        if executable == PROGRESS:
+        if executable in ONLOOKERS:
             return False  # nothing of the run needs it
         first = self.exit_code is None
         if first:

@@ -81,6 +81,17 @@ def progress(scenario: Scenario, namespace: str) -> Process:
     return Process(names.PROGRESS, namespace, parameters)
 
 
+def viewer(scenario: Scenario, port: int) -> Process:
+    """Make the process that shows a run in a browser.
+
+    Args:
+        scenario: what is run.
+        port: on which it serves.
+    """
+    known = progress(scenario, "/").parameters
+    return Process(names.VIEWER, "/", {**known, "port": port})
+
+
 def _inside(namespace: str, robot: str) -> str:
     """Return a robot's namespace ('': the formation's own) in that of its formation."""
     if not robot:

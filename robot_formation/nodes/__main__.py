@@ -9,7 +9,7 @@ from robot_formation.nodes import executables
 
 NAMES = (
     *("world", "overhead_tracker", "drive", "block_detector", "predictor", "fine_tuner", "leader"),
-    *("recorder", "player", "progress"),
+    *("recorder", "player", "progress", "viewer"),
 )
 
 

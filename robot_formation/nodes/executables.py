@@ -1,6 +1,6 @@
 """The package's executables (`ros2 run robot_formation NAME`), one function each.
 
-What a node does is in components/, and for recorder, player and progress in the folders here.
+What a node does is in components/, and for recorder, player, progress and viewer in the folders here.
 """
 
 from __future__ import annotations
@@ -51,3 +51,12 @@ def progress() -> int:
     from robot_formation.nodes.progress.progress_node import ProgressExecutable
 
     return run_node("progress", ProgressExecutable)
+
+
+def viewer() -> int:
+    """Run the viewer until it ends."""
+    stop_on_signals()
+    from robot_formation.nodes.host.component_node import run_node
+    from robot_formation.nodes.viewer.viewer_node import ViewerExecutable
+
+    return run_node("viewer", ViewerExecutable)

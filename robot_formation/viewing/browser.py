@@ -22,11 +22,14 @@ class ViewError(FormationError):
     """A run can't be shown; the text says why."""
 
 
-def check_viewer(port: int) -> None:
+def check_viewer(port: int) -> int:
     """Check that a view can be served.
 
     Args:
         port: of this machine; 0 for any free one.
+
+    Returns:
+        The port, which is free now.
 
     Raises:
         ViewError: viser isn't installed, or the port can't be used.
@@ -39,6 +42,7 @@ def check_viewer(port: int) -> None:
         except OSError as error:
             reason = f"port {port} of {HOST} can't be used ({error.strerror})"
             raise ViewError(f"{reason}; choose another one, or 0 for any free one") from error
+        return int(probe.getsockname()[1])
 
 
 @contextlib.contextmanager
@@ -63,6 +67,7 @@ def view_server(port: int, title: str) -> Iterator[Any]:
             raise ViewError(f"port {port} of {HOST} can't be used (taken a moment ago); choose another one")
         # The button would send the page over a server on the internet.
         server.gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        server.gui.main_panel.dock_right()
         yield server
     finally:
         with _quiet():

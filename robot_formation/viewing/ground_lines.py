@@ -30,7 +30,8 @@ def contour_lines(ground: Ground, levels: int = _LEVELS) -> list[tuple[float, Ar
 def _cut(ground: Ground, height_m: float) -> Array:
     corners = ground.vertices_m[ground.triangles]  # (m, 3, 3)
     above = corners[:, :, 2] > height_m
-    corners, above = (part[above.any(axis=1) & ~above.all(axis=1)] for part in (corners, above))
+    crossed = above.any(axis=1) & ~above.all(axis=1)
+    corners, above = corners[crossed], above[crossed]
     # One corner lies alone on its side of the cut, which crosses the two edges that meet in it.
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
     rows = np.arange(len(corners))

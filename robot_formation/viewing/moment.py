@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.quantiles import ELLIPSE_90
 from robot_formation.follower.alignment_state import AlignmentState
-from robot_formation.geometry.orientation import Quaternion, Vector
+from robot_formation.geometry.orientation import Quaternion, Vector, yaw_rad
 from robot_formation.geometry.se2 import Motion
 
 Picture = NDArray[np.uint8]
@@ -39,6 +39,16 @@ class RobotPose:
     position_m: Vector
     orientation: Quaternion
     joints_rad: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def planar(self) -> Motion:
+        """The pose seen from above."""
+        return Motion(self.position_m[0], self.position_m[1], yaw_rad(self.orientation))
+
+
+def finite_angles(joints: Iterable[str], positions: Iterable[float]) -> dict[str, float]:
+    """Return the angles that are numbers, by joint."""
+    return {joint: float(angle) for joint, angle in zip(joints, positions, strict=False) if math.isfinite(angle)}
 
 
 @dataclass(frozen=True)
@@ -68,8 +78,8 @@ class Forecast:
         circle = np.column_stack([np.cos(angles), np.sin(angles)])
         local = (circle * np.sqrt(ELLIPSE_90 * np.maximum(values, 0.0))) @ axes.T
         cosine, sine = math.cos(self.start.yaw_rad), math.sin(self.start.yaw_rad)
-        turned: NDArray[np.float64] = local @ np.array([[cosine, sine], [-sine, cosine]])
-        return turned + (self.end.x_m, self.end.y_m)
+        turned = local @ np.array([[cosine, sine], [-sine, cosine]])
+        return np.asarray(turned + np.array((self.end.x_m, self.end.y_m)), float)
 
 
 @dataclass(frozen=True)

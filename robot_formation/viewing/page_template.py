@@ -48,8 +48,8 @@ button, select { font: inherit; padding: .15rem .6rem; }
 <small id="rendered" hidden>The bag holds no pictures: these are rendered from ground truth.</small>
 <h2><span class="error">formation error</span> and <span class="correction">correction</span> (cm) by timestep</h2>
 <svg id="plot" viewBox="0 0 340 190" role="img" aria-label="formation error and correction by timestep"></svg>
-<p><small>Rings are places in formation. Black lines are forecasts of the next displacement with their 90 % ellipses.
-Lines on the ground are contour lines. Drag to turn the view, scroll to come closer.</small></p>
+<p><small>A rectangle on the ground is a robot's place in formation. Black lines over a robot are the forecast of its
+next displacement with its 90 % ellipse. Drag to turn the view, scroll to come closer.</small></p>
 </main>
 <script type="application/json" id="data">@DATA@</script>
 <script>
@@ -71,7 +71,8 @@ function goTo(second) {
   const input = inScene("input");
   if (!input) return;
   const view = scene.contentWindow;
-  Object.getOwnPropertyDescriptor(view.HTMLInputElement.prototype, "value").set.call(input, String(second / data.scale));
+  const { set } = Object.getOwnPropertyDescriptor(view.HTMLInputElement.prototype, "value");
+  set.call(input, String(second / data.scale));
   input.dispatchEvent(new view.Event("input", { bubbles: true }));
 }
 function last(rows, second) {
@@ -122,7 +123,8 @@ function draw(finished) {
     if (count <= 60) for (const row of done)
       text += `<circle cx="${x(row[0])}" cy="${y(row[column])}" r="2.5" fill="${colour}"/>`;
   }
-  if (finished) text += `<line x1="${x(finished)}" x2="${x(finished)}" y1="10" y2="160" stroke="#444" stroke-dasharray="3 3"/>`;
+  const now = x(finished);
+  if (finished) text += `<line x1="${now}" x2="${now}" y1="10" y2="160" stroke="#444" stroke-dasharray="3 3"/>`;
   text += `<text x="182" y="188" text-anchor="middle">timestep</text>`;
   element("plot").innerHTML = text;
 }

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -21,8 +20,8 @@ from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import Message
 from robot_formation.viewing.lens import Lens, read_lens
-from robot_formation.viewing.moment import FollowerNow, Forecast, Moment, RobotPose, TimestepFigures
-from robot_formation.viewing.robot_shape import Link, read_shape
+from robot_formation.viewing.moment import FollowerNow, Forecast, Moment, RobotPose, TimestepFigures, finite_angles
+from robot_formation.viewing.robot_shape import read_shape
 from robot_formation.viewing.true_poses import TruePoses
 
 _POSE_PERIOD_NS = 100_000_000
@@ -95,11 +94,12 @@ class RunMoments:
     def path(self, robot: str, most: int = 2000) -> NDArray[np.float64]:
         """Return a robot's path (n, 3), metres, thinned to so many places."""
         places = self._poses[robot].positions_m
-        return places[np.unique(np.linspace(0, len(places) - 1, min(most, len(places))).round().astype(int))]
+        chosen = np.unique(np.linspace(0, len(places) - 1, min(most, len(places))).round().astype(int))
+        return np.asarray(places[chosen], float)
 
     def instants(self, most: int, period_ns: int = _POSE_PERIOD_NS) -> list[int]:
         """List instants from the run's start to its end at which a moving robot is to be shown: at most so many."""
-        return np.arange(self.start_ns, self.end_ns + 1, max(period_ns, self.duration_ns // most)).tolist()
+        return list(range(self.start_ns, self.end_ns + 1, max(period_ns, self.duration_ns // most)))
 
     @property
     def duration_ns(self) -> int:
@@ -182,11 +182,6 @@ class _Joints:
         except Exception as error:  # rosbags' decoders have no common error
             raise BagError(f"'{self._topic}' holds a message that can't be read: {error}") from error
         return finite_angles(message.name, message.position)
-
-
-def finite_angles(joints: Iterable[str], positions: Iterable[float]) -> dict[str, float]:
-    """Return the angles that are numbers, by joint."""
-    return {joint: float(angle) for joint, angle in zip(joints, positions, strict=False) if math.isfinite(angle)}
 
 
 def _count(stamps_ns: Sequence[int], until_ns: int) -> int:

@@ -23,14 +23,19 @@ _LEADER_RGB: Rgb = (230, 159, 0)
 _FOLLOWER_RGB: tuple[Rgb, ...] = ((0, 114, 178), (0, 158, 115), (204, 121, 167), (86, 180, 233))
 _GROUND_RGB: Rgb = (206, 210, 200)
 _LOW_RGB, _HIGH_RGB = np.array((70, 90, 120)), np.array((190, 120, 60))
-_LIFT_M = 0.003
+_LIFT_M = 0.004
 """Lines lie so far above the ground, so that it doesn't hide them."""
 _LINE_M = 0.004
-_CONE_M = 0.28
+_CONE_M = 0.13
 _LABEL_M = 0.29
 _PICTURE_QUALITY = 70
+_BODY_OPACITY = 0.6
+"""The body is seen through, since it hides the wheels."""
 _SPOKE_RGB: Rgb = (190, 190, 190)
-_RING_M = 0.035
+_FORECAST_M = 0.235
+"""Forecasts are drawn so high above the ground, over the robots: what is below them can't be seen."""
+_CROSS_M = 0.009
+_BESIDE_M = 0.015
 
 
 def robot_rgb(robot: str) -> Rgb:
@@ -55,9 +60,12 @@ class Stage:
         self._joints: dict[str, list[Link]] = {}
         self._cameras: dict[str, Any] = {}
         self._places: dict[str, Any] = {}
+        self._outlines: dict[str, NDArray[np.float64]] = {}
         self._forecasts: dict[str, tuple[Forecast | None, Any]] = {}
         self._shown: dict[str, tuple[float, ...]] = {}
         self._scene.world_axes.visible = False
+        # Shadows take most of the time of a browser that draws without a graphics card.
+        self._scene.configure_default_lights(cast_shadow=False)
 
     def ground(self, ground: Ground) -> None:
         """Draw the ground with its contour lines, and look at it as a whole."""
@@ -69,7 +77,7 @@ class Stage:
         for number, (_, segments) in enumerate(contours):
             share = number / max(1, len(contours) - 1)
             rgb = np.rint(_LOW_RGB + share * (_HIGH_RGB - _LOW_RGB)).astype(np.uint8)
-            lifted = segments + (0.0, 0.0, _LIFT_M)
+            lifted = segments + np.array((0.0, 0.0, _LIFT_M))
             self._scene.add_line_segments(f"/ground/contour_{number}", lifted, rgb, thickness=0.5 * _LINE_M)
         self.look_at(ground.vertices_m)
 
@@ -79,21 +87,24 @@ class Stage:
         middle, size = 0.5 * (low + high), max(0.5, float(np.linalg.norm((high - low)[:2])))
         camera = self._server.initial_camera
         camera.look_at = tuple(middle.tolist())
-        camera.position = tuple((middle + size * np.array((0.42, -0.55, 0.5))).tolist())
-        camera.fov = math.radians(50.0)
+        camera.position = tuple((middle + size * np.array((0.55, -0.75, 0.7))).tolist())
+        camera.fov = math.radians(45.0)
+        camera.near, camera.far = 0.05, 100.0
 
     def robot(self, robot: str, links: Sequence[Link]) -> None:
         """Draw a robot, or anew if its description has changed."""
         frame = self._scene.add_frame(f"/robots/{robot}", show_axes=False)
         self._frames[robot] = frame
         self._joints[robot] = [link for link in links if link.axis is not None]
+        self._outlines[robot] = _outline(links)
         for link in links:
             path = f"/robots/{robot}/{link.name}"
             self._frames[path] = self._scene.add_frame(
                 path, show_axes=False, position=link.place_m, wxyz=_wxyz(link.turn)
             )
             for number, part in enumerate(link.parts):
-                self._part(f"{path}/{number}", part)
+                body = link.name == names.BASE_FRAME and part is _largest(links)
+                self._part(f"{path}/{number}", part, _BODY_OPACITY if body else None)
                 if link.axis is not None and not part.is_box:
                     self._spokes(f"{path}/spokes_{number}", part)
         label = robot.replace("_", " ")
@@ -119,7 +130,7 @@ class Stage:
     def path(self, robot: str, points_m: NDArray[np.float64]) -> None:
         """Draw the way (n, 3) that a robot's base_link takes."""
         if len(points_m) > 1:
-            lifted = points_m + (0.0, 0.0, _LIFT_M)
+            lifted = points_m + np.array((0.0, 0.0, _LIFT_M))
             self._segments(f"/paths/{robot}", np.stack([lifted[:-1], lifted[1:]], axis=1), robot_rgb(robot))
 
     def picture(self, robot: str, picture: Picture) -> None:
@@ -157,10 +168,10 @@ class Stage:
 
     def _place(self, robot: str, place: Motion | None) -> None:
         key = f"/places/{robot}"
-        if place is None:
+        if place is None or robot not in self._outlines:
             return
         if key not in self._places:
-            self._places[key] = self._segments(key, _ring(), robot_rgb(robot))
+            self._places[key] = self._segments(key, self._outlines[robot], robot_rgb(robot))
         (height,) = self._height.of(np.array([[place.x_m, place.y_m]])).tolist()
         self._put(key, self._places[key], (place.x_m, place.y_m, height + 2 * _LIFT_M), _about_z(place.yaw_rad))
 
@@ -182,18 +193,23 @@ class Stage:
     def _forecast_lines(self, forecast: Forecast) -> NDArray[np.float64]:
         """Return the displacement, a cross where it ends, and the ellipse around it, (n, 2, 3)."""
         start, end = forecast.start, forecast.end
-        arm = 0.25 * _RING_M
+        arm = _CROSS_M
         places = [[(start.x_m, start.y_m), (end.x_m, end.y_m)]]
         places += [[(end.x_m - x, end.y_m - y), (end.x_m + x, end.y_m + y)] for x, y in ((arm, arm), (arm, -arm))]
         ellipse = forecast.ellipse()
         flat = np.concatenate([np.array(places), np.stack([ellipse[:-1], ellipse[1:]], axis=1)])
-        return self._height.on_ground(flat.reshape(-1, 2), 3 * _LIFT_M).reshape(-1, 2, 3)
+        return self._height.on_ground(flat.reshape(-1, 2), _FORECAST_M).reshape(-1, 2, 3)
 
     def _segments(self, path: str, segments: NDArray[np.float64], rgb: Rgb) -> Any:
         return self._scene.add_line_segments(path, segments.astype(np.float32), rgb, thickness=_LINE_M)
 
-    def _part(self, path: str, part: Part) -> None:
-        where: Mapping[str, Any] = {"position": part.place_m, "wxyz": _wxyz(part.turn), "color": part.rgb}
+    def _part(self, path: str, part: Part, opacity: float | None) -> None:
+        where: Mapping[str, Any] = {
+            "position": part.place_m,
+            "wxyz": _wxyz(part.turn),
+            "color": part.rgb,
+            "opacity": opacity,
+        }
         if part.is_box:
             self._scene.add_box(path, dimensions=part.size_m, **where)
         else:
@@ -209,6 +225,12 @@ class Stage:
         )
 
 
+def _largest(links: Sequence[Link]) -> Part | None:
+    """Return the box that covers most ground."""
+    boxes = [part for link in links for part in link.parts if part.is_box]
+    return max(boxes, key=lambda box: box.size_m[0] * box.size_m[1], default=None)
+
+
 def _wxyz(orientation: Quaternion) -> Quaternion:
     """Order the components of an orientation as viser does."""
     x, y, z, w = orientation
@@ -219,9 +241,11 @@ def _about_z(angle_rad: float) -> Quaternion:
     return (0.0, 0.0, math.sin(0.5 * angle_rad), math.cos(0.5 * angle_rad))
 
 
-def _ring() -> NDArray[np.float64]:
-    """Return a place's sign: a ring, and a bar that tells the heading (x), (n, 2, 3) metres."""
-    angles = np.linspace(0.0, math.tau, 37)
-    circle = _RING_M * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(37)])
-    heading = np.array([[(_RING_M, 0.0, 0.0), (1.7 * _RING_M, 0.0, 0.0)]])
-    return np.concatenate([np.stack([circle[:-1], circle[1:]], axis=1), heading])
+def _outline(links: Sequence[Link]) -> NDArray[np.float64]:
+    """Return a place's sign: a rectangle around the robot's body, and a bar that tells the heading (x): (5, 2, 3) m."""
+    largest = _largest(links)
+    length, width = (0.2, 0.2) if largest is None else largest.size_m[:2]
+    x, y = 0.5 * length + _BESIDE_M, 0.5 * width + _BESIDE_M
+    corners = np.array([(x, y, 0.0), (-x, y, 0.0), (-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0)])
+    heading = np.array([[(x, 0.0, 0.0), (x + 2.0 * _BESIDE_M, 0.0, 0.0)]])
+    return np.concatenate([np.stack([corners[:-1], corners[1:]], axis=1), heading])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,9 @@ def write_page(path: Path, bag: FormationBag, run: RunMoments, warn: Callable[[s
     """
     text = make_page(bag, run, warn).encode("utf-8")
     if len(text) > MOST_BYTES:
-        raise ViewError(f"the page would have {len(text) / 1e6:.1f} MB, more than {MOST_BYTES / 1e6:g} MB; nothing was written")
+        raise ViewError(
+            f"the page would have {len(text) / 1e6:.1f} MB, more than {MOST_BYTES / 1e6:g} MB; nothing was written"
+        )
     try:
         path.write_bytes(text)
     except OSError as error:
@@ -78,10 +81,7 @@ def make_page(bag: FormationBag, run: RunMoments, warn: Callable[[str], None]) -
         "SCENE": html.escape(_scene(run, shown, scale)),
         "DATA": told,
     }
-    page = PAGE
-    for name, text in parts.items():
-        page = page.replace(f"@{name}@", text, 1)
-    return page
+    return re.sub("@([A-Z]+)@", lambda match: parts[match[1]], PAGE)
 
 
 def _scene(run: RunMoments, shown: dict[str, list[tuple[int, Picture]]], scale: float) -> str:

@@ -43,6 +43,7 @@ def test_help_tells_purpose_usage_topics_and_every_parameter(name: str) -> None:
         ("recorder", "regex (string, '')"),
         ("player", "regex (string, '')"),
         ("progress", "followers (integer, 1; 1 to 10)"),
+        ("viewer", "rate_hz (double, 20.0 Hz; 0.5 to 60.0 Hz)"),
     ],
 )
 def test_help_of_the_nodes_for_bags_and_launched_runs(name: str, parameter: str) -> None:

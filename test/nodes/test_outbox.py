@@ -33,6 +33,7 @@ class Listeners:
         (("predictor",), True, True),
         (("my_predictor",), False, True),
         (("progress",), False, False),
+        (("viewer",), False, False),
         (("_monitor",), False, False),
         (("progress", "my_predictor"), False, True),
         (("progress", "predictor"), True, True),

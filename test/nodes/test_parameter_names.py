@@ -9,6 +9,7 @@ from robot_formation.nodes.host.ros_parameters import HostParameters
 from robot_formation.nodes.player.player_node import PlayerParameters
 from robot_formation.nodes.progress.progress_node import ProgressParameters
 from robot_formation.nodes.recorder.recorder_node import RecorderParameters
+from robot_formation.nodes.viewer.viewer_node import ViewerParameters
 from robot_formation.parameters import specs
 
 OF_RCLPY = ("use_sim_time", "start_type_description_service", "qos_overrides./topic.subscription.reliability")
@@ -17,6 +18,7 @@ NODES: dict[str, tuple[type, ...]] = {
     "recorder": (RecorderParameters, HostParameters),
     "player": (PlayerParameters,),
     "progress": (ProgressParameters,),
+    "viewer": (ViewerParameters,),
 }
 
 

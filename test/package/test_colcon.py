@@ -24,7 +24,7 @@ BIN = Path(sys.executable).parent
 
 
 PATH = f"{BIN}{os.pathsep}{os.environ.get('PATH', '')}"
-NODES = [*KINDS, "recorder", "player", "progress"]
+NODES = [*KINDS, "recorder", "player", "progress", "viewer"]
 
 
 def run_colcon(workspace: Path, *arguments: str) -> str:

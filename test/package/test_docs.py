@@ -20,7 +20,7 @@ from robot_formation.parameters import specs
 
 NODE_PAGES = ROOT / "docs" / "reference" / "nodes"
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "bags" / "README.md", *(ROOT / "docs").rglob("*.md")]
-NODES = [*KINDS, "recorder", "player", "progress"]
+NODES = [*KINDS, "recorder", "player", "progress", "viewer"]
 QOS = {
     "event": names.EVENT,
     "history": names.HISTORY,

@@ -126,7 +126,7 @@ def test_each_executable_starts_a_function_that_exists(setup_arguments: dict[str
 
 def test_each_node_is_an_executable_of_its_name(setup_arguments: dict[str, Any]) -> None:
     scripts = setup_arguments["entry_points"]["console_scripts"]
-    nodes = [*KINDS, "recorder", "player", "progress"]
+    nodes = [*KINDS, "recorder", "player", "progress", "viewer"]
     assert sorted(NAMES) == sorted(nodes)
     assert {f"{node} = robot_formation.nodes.executables:{node}" for node in nodes} == set(scripts) - {
         "formation = robot_formation.cli.__main__:main"

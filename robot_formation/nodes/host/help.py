@@ -29,6 +29,17 @@ _OTHERS = {
             ("reads", "<follower>/displacement and alignment"),
         ),
     ),
+    "viewer": (
+        "viewer.viewer_node",
+        (
+            ("reads", "surface"),
+            ("reads", "ground_truth/<robot>/odom, pose and path"),
+            ("reads", "<robot>/robot_description, joint_states and moved"),
+            ("reads", "<follower>/displacement, prediction and alignment"),
+            ("reads", "<follower>/camera/image_raw, camera/camera_info and blocks"),
+            ("calls", "world/pause, world/step and world/set_parameters, when people ask for it"),
+        ),
+    ),
 }
 
 

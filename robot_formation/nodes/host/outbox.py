@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from robot_formation.names import IMAGE_TYPE, PROGRESS, Message, Topic, absolute
+from robot_formation.names import IMAGE_TYPE, ONLOOKERS, Message, Topic, absolute
 
 _STAND_IN_S = 5.0
 
@@ -90,7 +90,7 @@ class Outbox:
         """Return whether nodes of other names listen in place of those expected: a user's own predictor, say."""
         found = self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name)
         found = [info for info in found if _full_name(info) != self._recorder]
-        names = {info.node_name for info in found if not info.node_name.startswith("_")} - {PROGRESS}
+        names = {info.node_name for info in found if not info.node_name.startswith("_")} - ONLOOKERS
         return len(names) >= max(len(topic.listeners), 1)
 
 

@@ -59,6 +59,7 @@ class Monitor:
     Attributes:
         messages: how many have come on the topics.
         reports: how often each node, by its full name, has reported on /diagnostics.
+        pauses: how many of these reports say that the world is paused: then nobody is to be expected to do anything.
     """
 
     def __init__(
@@ -82,6 +83,7 @@ class Monitor:
         self._listen = listen
         self.messages = 0
         self.reports: Counter[str] = Counter()
+        self.pauses = 0
         for name in topics:
             topic = topic_of(name)
             message_class = conversions.message_class(topic.type)
@@ -128,6 +130,7 @@ class Monitor:
     def _take_report(self, message: Message) -> None:
         for status in message.status:
             self.reports[status.name] += 1
+            self.pauses += any(value.key == names.PAUSED and value.value == str(True) for value in status.values)
 
     def _take(self, topic: str, message: Message) -> None:
         self.messages += 1

@@ -1,0 +1,1 @@
+"""A run that goes on, in three dimensions in a browser."""
