@@ -13,6 +13,8 @@ descriptions (scenario, parameters, versions) differ. BAG is what 'formation ana
 right, 'along v' forward.
 """
 
+FORMATS = ("png", "svg", "pdf")
+
 
 def add_parser(subparsers: Subparsers) -> None:
     """Add the verb to the command line."""
@@ -23,6 +25,13 @@ def add_parser(subparsers: Subparsers) -> None:
     )
     parser.add_argument(
         "--json", action="store_true", help="print JSON and nothing else; pictures are drawn only if --out is given"
+    )
+    parser.add_argument(
+        "--format",
+        metavar="KIND",
+        choices=FORMATS,
+        default=FORMATS[0],
+        help=f"kind of the pictures: {', '.join(FORMATS)} (default: {FORMATS[0]})",
     )
     parser.add_argument("--no-pictures", action="store_true", help="draw no pictures")
     parser.add_argument(
@@ -54,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     if drawn:
         from robot_formation.reporting.comparison_figures import comparison_folder, write_comparison
 
-        pictures = write_comparison(runs, args.out or comparison_folder(args.bags[0]))
+        pictures = write_comparison(runs, args.out or comparison_folder(args.bags[0]), args.format)
     if args.json:
         found = {**comparison_json(runs), "pictures": [str(picture) for picture in pictures]}
         print(json.dumps(found, indent=2, allow_nan=False))

@@ -32,17 +32,22 @@ _FLAT_M = 1e-6
 _MANY = 60  # timesteps from which on single marks would run into each other
 
 
-def write_comparison(runs: Sequence[Run], folder: Path) -> list[Path]:
+def write_comparison(runs: Sequence[Run], folder: Path, picture_format: str = "png") -> list[Path]:
     """Draw all pictures into a folder, made if it is missing; pictures of an older comparison are replaced.
+
+    Args:
+        runs: what is compared.
+        folder: where to.
+        picture_format: png, svg or pdf.
 
     Raises:
         AnalysisError: the folder or a picture can't be written.
     """
     out = made_folder(folder)
     return [
-        draw_corrections_by_timestep(runs, out / "corrections.png"),
-        draw_errors_by_timestep(runs, out / "errors.png"),
-        draw_trajectories(runs, out / "trajectories.png"),
+        draw_corrections_by_timestep(runs, out / f"corrections.{picture_format}"),
+        draw_errors_by_timestep(runs, out / f"errors.{picture_format}"),
+        draw_trajectories(runs, out / f"trajectories.{picture_format}"),
     ]
 
 

@@ -78,6 +78,8 @@ def test_by_default_pictures_go_beside_the_first_bag(capsys: pytest.CaptureFixtu
     assert not (tmp_path / "a_comparison").exists()
     printed(capsys, "compare", *bags)
     assert (tmp_path / "a_comparison" / "errors.png").exists()
+    printed(capsys, "compare", *bags, "--format", "svg")
+    assert (tmp_path / "a_comparison" / "errors.svg").read_text(encoding="utf-8").startswith("<?xml")
 
 
 def test_runs_of_different_length_followers_and_ends_are_set_side_by_side(tmp_path: Path) -> None:

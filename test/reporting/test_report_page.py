@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from chromium import Chromium
 from cli_tools import complaint
-from headless_chromium import open_page
 from report_samples import MEASURED, PREVIOUS, made_up_sweep
 from repository import ROOT
 from robot_formation.analysis.sweep_summary import summarise
@@ -141,20 +141,28 @@ def test_pages_are_whole_accessible_and_small(page: str, request: pytest.Fixture
 
 
 @pytest.mark.slow
-def test_pages_open_in_chromium_without_network_and_errors(mixed_page: str, tmp_path: Path) -> None:
-    (tmp_path / "page.html").write_text(mixed_page, encoding="utf-8")
-    opened = open_page(tmp_path / "page.html", tmp_path)
-    assert "Did it hold the formation?" in opened.document
-    assert opened.console == []
-    assert opened.requested == []
+def test_pages_open_in_a_narrow_browser_without_network_and_errors(mixed_page: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    page.write_text(mixed_page, encoding="utf-8")
+    with Chromium(tmp_path / "profile") as browser:
+        browser.open(page.as_uri())
+        browser.until("document.readyState === 'complete' && document.querySelectorAll('h2').length > 5")
+        assert browser.value("document.documentElement.scrollWidth <= window.innerWidth")  # 400 px wide
+        small = "[...document.querySelectorAll('figure svg')].filter(each => each.getBoundingClientRect().height < 100)"
+        assert browser.value(f"{small}.length") == 0
+        assert browser.errors == []
+        assert browser.requests == [page.as_uri()]
 
 
 @pytest.mark.slow
 def test_what_a_page_asks_for_or_complains_of_is_found(tmp_path: Path) -> None:
-    (tmp_path / "page.html").write_text("<img src='http://example.com/a.png'><script>absent()</script>")
-    opened = open_page(tmp_path / "page.html", tmp_path)
-    assert len(opened.console) == 1
-    assert opened.requested == ["http://example.com/a.png"]
+    page = tmp_path / "page.html"
+    page.write_text("<!DOCTYPE html><link rel=icon href=data:,><img src=http://example.com/a.png><script>no()</script>")
+    with Chromium(tmp_path / "profile") as browser:
+        browser.open(page.as_uri())
+        browser.until("document.readyState === 'complete' && document.images[0].complete")
+        assert len(browser.errors) == 2
+        assert browser.requests == [page.as_uri(), "http://example.com/a.png"]
 
 
 def test_texts_from_outside_stay_texts(tmp_path: Path) -> None:
