@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,9 +15,12 @@ from robot_formation import names
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.run_record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
+from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.message_recorder import METADATA_NAME
+from robot_formation.bag.odometry import ODOMETRY_TYPE, Odometry
 from robot_formation.bag.reader import read_bag
+from robot_formation.bag.source import RawMessage
 from robot_formation.geometry.orientation import yaw_rad
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import Message
@@ -54,22 +57,45 @@ def run_record(bag: FormationBag) -> RunRecord:
     return record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
 
 
-def run_messages(bag: FormationBag) -> tuple[list[str], dict[str, list[Message]], dict[str, list[int]]]:
+def run_messages(
+    bag: FormationBag, beside: Callable[[RawMessage], None] | None = None, topics: Collection[str] = ()
+) -> tuple[list[str], dict[str, Sequence[Message]], dict[str, list[int]]]:
     """Read what a run's record is made of: robots, messages by topic, and simulated time [ns] of each of these.
+
+    Args:
+        bag: the open bag.
+        beside: takes messages of other topics as they were recorded: reading a long bag twice takes twice as long.
+        topics: their names.
 
     Raises:
         BagError: the bag is corrupted, or a topic has another message type than a run's.
         AnalysisError: the bag has no run of a formation.
     """
-    robots = _robots(bag)
+    robots = robots_in(bag)
     wanted = run_topics(robots)
     bag.require({topic: type_name for topic, type_name in wanted.items() if topic in bag.topics})
     messages: dict[str, list[Message]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
-    for message in bag.messages(wanted):
-        messages[message.topic].append(message.message)
-        stamps[message.topic].append(message.stamp_ns)
-    return robots, messages, stamps
+    cdr: dict[str, list[bytes]] = defaultdict(list)
+    for raw in bag.raw_messages({*wanted, *topics}):
+        if raw.topic not in wanted:
+            if beside is not None:
+                beside(raw)
+            continue
+        stamps[raw.topic].append(raw.stamp_ns)
+        if raw.type_name == ODOMETRY_TYPE:
+            cdr[raw.topic].append(raw.cdr)
+        else:
+            messages[raw.topic].append(bag.bag.decoded(raw).message)
+    return robots, {**messages, **{topic: _odometry(bag, topic, found) for topic, found in cdr.items()}}, stamps
+
+
+def _odometry(bag: FormationBag, topic: str, cdr: Sequence[bytes]) -> Odometry:
+    try:
+        return Odometry(cdr)
+    except Exception as error:  # rosbags' decoders have no common error
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise BagError(f"{bag.path}: '{topic}' holds a message that can't be read: {reason}") from error
 
 
 def record_of(
@@ -86,7 +112,7 @@ def record_of(
         details: what the run says of itself.
         stamps: simulated time [ns] of each of these messages, where it is known.
     """
-    messages = defaultdict(list, messages)
+    messages = defaultdict(tuple, messages)
     stamps = defaultdict(list, stamps or {})
     markers = messages[names.SURFACE.of()]
     tracks = {robot: _track(messages[names.ground_truth_odom(robot).of()]) for robot in robots}
@@ -155,7 +181,7 @@ def _last_stamp_ns(messages: Mapping[str, Sequence[Message]]) -> int:
     )
 
 
-def _robots(bag: FormationBag) -> list[str]:
+def robots_in(bag: FormationBag) -> list[str]:
     """Find the robots by their topics: the leader, then the followers by number."""
     topics = "|".join(topic.name for topic in (*_MOTIONS, names.ALIGNMENT))
     found = {match[1] for topic in bag.topics if (match := re.fullmatch(rf"/follower_([1-9]\d*)/(?:{topics})", topic))}
@@ -240,6 +266,10 @@ def _track(messages: Sequence[Message]) -> Track | None:
     """Turn Odometry messages into a true path, in order of their stamps."""
     if not messages:
         return None
+    if isinstance(messages, Odometry):
+        order = np.argsort(messages.stamps_ns, kind="stable")
+        yaws = np.array([yaw_rad(turn) for turn in messages.orientations.tolist()])
+        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order])
     poses = [message.pose.pose for message in messages]
     stamps = np.array([_stamp_ns(message) for message in messages], dtype=np.int64)
     positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
@@ -272,7 +302,10 @@ def _overhead(
         moved[0] = moved[1]
         stamps = np.array([_stamp_ns(message) for message in told], dtype=np.int64)[moved]
         seen = places[moved]
-        true_stamps = np.array([_stamp_ns(message) for message in truth], dtype=np.int64)
+        if isinstance(truth, Odometry):
+            true_stamps = truth.stamps_ns
+        else:
+            true_stamps = np.array([_stamp_ns(message) for message in truth], dtype=np.int64)
         order = np.argsort(true_stamps, kind="stable")
         # A robot that stands says nothing, so its last word before the picture holds.
         index = np.searchsorted(true_stamps[order], stamps, side="right") - 1

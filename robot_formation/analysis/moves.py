@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from statistics import median
 
 from robot_formation.analysis.run_record import FollowerRecord
@@ -140,7 +141,16 @@ def _with_timestep(states: Sequence[str]) -> Iterator[tuple[int, str]]:
 
 
 def _texts(follower: FollowerRecord, t: int) -> list[str]:
-    return [text for timestep, text in _with_timestep(follower.states) if timestep == t]
+    return _by_timestep(follower.states).get(t, [])
+
+
+@lru_cache(maxsize=16)
+def _by_timestep(states: tuple[str, ...]) -> dict[int, list[str]]:
+    """Sort a run's states by timestep, once for all of its timesteps."""
+    found: dict[int, list[str]] = {}
+    for timestep, text in _with_timestep(states):
+        found.setdefault(timestep, []).append(text)
+    return found
 
 
 def movements_of(follower: FollowerRecord, indices: Sequence[int]) -> int:

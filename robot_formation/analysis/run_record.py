@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from robot_formation.bag.run_details import node_parameters, whole_number
 from robot_formation.follower.alignment_state import AlignmentState
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
+from robot_formation.json_values import JsonObject
 from robot_formation.schedule.schedules import Spacing
 
 DOT_HEIGHT_M = 0.216
@@ -145,6 +147,11 @@ class RunRecord:
     overhead: Mapping[str, OverheadTrack] = field(default_factory=dict)
     left_plate: tuple[str, ...] = ()
 
+    @cached_property
+    def _parameters(self) -> dict[str, JsonObject]:
+        """The parameters of the run's nodes, read once: they are long."""
+        return node_parameters(self.details)
+
     @property
     def timesteps_planned(self) -> int | None:
         """Timesteps that the scenario has, if the run says."""
@@ -154,7 +161,7 @@ class RunRecord:
     def dot_height_m(self) -> float:
         """Height of the reference dot above base_link, metres: what the run says, else the paper's robot's."""
         try:
-            said = float(node_parameters(self.details)["world"]["marker.top_m"])
+            said = float(self._parameters["world"]["marker.top_m"])
         except (KeyError, ValueError, TypeError, OverflowError):
             return DOT_HEIGHT_M
         return said if math.isfinite(said) else DOT_HEIGHT_M
@@ -163,7 +170,7 @@ class RunRecord:
     def formation_distance_m(self) -> float:
         """Distance between neighbours in formation, metres: the run's fine-tuner's, else the paper's."""
         try:
-            said = float(node_parameters(self.details)["fine_tuner"]["formation_distance_m"])
+            said = float(self._parameters["fine_tuner"]["formation_distance_m"])
         except (KeyError, ValueError, TypeError, OverflowError):
             return FORMATION_DISTANCE_M
         return said if math.isfinite(said) else FORMATION_DISTANCE_M
@@ -171,5 +178,5 @@ class RunRecord:
     @property
     def delayed(self) -> bool:
         """Whether followers keep their places beside where their neighbours stood one timestep earlier."""
-        fine_tuner = node_parameters(self.details).get("fine_tuner", {})
+        fine_tuner = self._parameters.get("fine_tuner", {})
         return fine_tuner.get("spacing") == Spacing.DELAYED.value

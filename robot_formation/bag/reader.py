@@ -137,11 +137,19 @@ class Bag:
             BagError: the bag is corrupted, or holds less than it says.
         """
         for raw in self.raw_messages(topics, start_ns, stop_ns):
-            try:
-                message = self._typestore.deserialize_cdr(raw.cdr, raw.type_name)
-            except Exception as error:  # rosbags' decoders have no common error
-                raise _corrupted(self.path, error) from error
-            yield BagMessage(raw.topic, raw.type_name, raw.stamp_ns, message)
+            yield self.decoded(raw)
+
+    def decoded(self, raw: RawMessage) -> BagMessage:
+        """Decode a message of this bag.
+
+        Raises:
+            BagError: the bag is corrupted.
+        """
+        try:
+            message = self._typestore.deserialize_cdr(raw.cdr, raw.type_name)
+        except Exception as error:  # rosbags' decoders have no common error
+            raise _corrupted(self.path, error) from error
+        return BagMessage(raw.topic, raw.type_name, raw.stamp_ns, message)
 
     def raw_messages(
         self, topics: Collection[str], start_ns: int | None = None, stop_ns: int | None = None

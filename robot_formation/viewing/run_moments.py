@@ -10,15 +10,14 @@ from numpy.typing import NDArray
 
 from robot_formation import names
 from robot_formation.analysis.chain import pose_at_end
-from robot_formation.analysis.from_bag import record_of, run_messages
+from robot_formation.analysis.from_bag import record_of, robots_in, run_messages
 from robot_formation.analysis.quantities import RunAnalysis, analyse
 from robot_formation.analysis.run_record import FollowerRecord
-from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.message_recorder import METADATA_NAME
+from robot_formation.bag.source import RawMessage
 from robot_formation.geometry.se2 import Motion
-from robot_formation.names import Message
 from robot_formation.viewing.lens import Lens, read_lens
 from robot_formation.viewing.moment import FollowerNow, Forecast, Moment, RobotPose, TimestepFigures, finite_angles
 from robot_formation.viewing.robot_shape import read_shape
@@ -46,14 +45,15 @@ class RunMoments:
             BagError: the bag is corrupted, a topic has another message type than a run's, or there are no true poses.
             AnalysisError: the bag has no run of a formation.
         """
-        robots, messages, stamps = run_messages(bag)
+        self._bag = bag
+        self._beside = {topic: list[RawMessage]() for topic in self._topics_beside(robots_in(bag))}
+        robots, messages, stamps = run_messages(bag, lambda raw: self._beside[raw.topic].append(raw), self._beside)
         self.record = record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
         odometry = {robot: messages[names.ground_truth_odom(robot).of()] for robot in robots}
         self._poses = {robot: TruePoses(found, _POSE_PERIOD_NS) for robot, found in odometry.items() if found}
         if not self._poses:
             topic = names.ground_truth_odom(names.LEADER).of()
             raise BagError(f"{bag.path} tells no true poses, which a view is made of; record '{topic}' and the like")
-        self._bag = bag
         self.shapes = {robot: read_shape(self._text(names.robot_description(robot).of())) for robot in self._poses}
         lenses = {robot: self._lens(names.camera_info(robot).of()) for robot in self._poses}
         self.lenses = {robot: lens for robot, lens in lenses.items() if lens is not None}
@@ -116,7 +116,20 @@ class RunMoments:
 
     @cached_property
     def _joints(self) -> dict[str, _Joints]:
-        return {robot: _Joints(self._bag, names.joint_states(robot).of()) for robot in self._poses}
+        return {robot: _Joints(self._beside[names.joint_states(robot).of()], self._bag) for robot in self._poses}
+
+    def _topics_beside(self, robots: Sequence[str]) -> dict[str, str]:
+        """List the topics that only a view needs, with their types; those that the bag has must be of these.
+
+        Raises:
+            BagError: one is of another type.
+        """
+        topics = [
+            kind(robot) for kind in (names.robot_description, names.camera_info, names.joint_states) for robot in robots
+        ]
+        found = {topic.of(): topic.type for topic in topics}
+        self._bag.require({topic: kind for topic, kind in found.items() if topic in self._bag.topics})
+        return found
 
     def _follower(self, follower: FollowerRecord, stamp_ns: int) -> FollowerNow:
         states = int(np.searchsorted(follower.state_stamps_ns, stamp_ns, side="right"))
@@ -145,29 +158,21 @@ class RunMoments:
         return Forecast(start, told.motion, told.covariance_uv)
 
     def _text(self, topic: str) -> str:
-        if topic not in self._bag.topics:
-            return ""
-        self._bag.require({topic: names.robot_description("").type})
-        return str(next(iter(self._bag.messages([topic]))).message.data)
+        messages = self._beside[topic]
+        return str(self._bag.bag.decoded(messages[-1]).message.data) if messages else ""
 
     def _lens(self, topic: str) -> Lens | None:
-        if topic not in self._bag.topics:
-            return None
-        self._bag.require({topic: names.camera_info().type})
-        return read_lens(next(iter(self._bag.messages([topic]))).message)
+        messages = self._beside[topic]
+        return read_lens(self._bag.bag.decoded(messages[-1]).message) if messages else None
 
 
 class _Joints:
     """Angles of a robot's joints, decoded when they are asked for: a long run has tens of thousands."""
 
-    def __init__(self, bag: FormationBag, topic: str) -> None:
-        found = []
-        if topic in bag.topics:
-            bag.require({topic: names.joint_states().type})
-            found = list(bag.raw_messages([topic]))
-        self._stamps_ns = np.array([message.stamp_ns for message in found], dtype=np.int64)
-        self._cdr = [message.cdr for message in found]
-        self._topic, self._last = topic, (-1, dict[str, float]())
+    def __init__(self, messages: Sequence[RawMessage], bag: FormationBag) -> None:
+        self._messages, self._bag = messages, bag.bag
+        self._stamps_ns = np.array([message.stamp_ns for message in messages], dtype=np.int64)
+        self._last = (-1, dict[str, float]())
 
     def at(self, stamp_ns: int) -> dict[str, float]:
         """Return the angles by joint, radians, that were told last; none before the first."""
@@ -177,10 +182,7 @@ class _Joints:
         return self._last[1]
 
     def _decoded(self, index: int) -> dict[str, float]:
-        try:
-            message: Message = jazzy_typestore().deserialize_cdr(self._cdr[index], names.joint_states().type)
-        except Exception as error:  # rosbags' decoders have no common error
-            raise BagError(f"'{self._topic}' holds a message that can't be read: {error}") from error
+        message = self._bag.decoded(self._messages[index]).message
         return finite_angles(message.name, message.position)
 
 

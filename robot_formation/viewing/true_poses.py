@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from robot_formation import names
 from robot_formation.bag.formation_bag import FormationBag
+from robot_formation.bag.odometry import Odometry
 from robot_formation.names import Message
 from robot_formation.world.pose import Pose
 
@@ -30,6 +31,12 @@ class TruePoses:
             messages: at least one.
             period_ns: longest time between two poses of a motion. A robot that stands tells none.
         """
+        self._period_ns = period_ns
+        if isinstance(messages, Odometry):
+            order = np.argsort(messages.stamps_ns, kind="stable")
+            self.stamps_ns = messages.stamps_ns[order]
+            self.positions_m, self.orientations = messages.positions_m[order], messages.orientations[order]
+            return
         poses = [message.pose.pose for message in messages]
         stamps = np.array([m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
         order = np.argsort(stamps, kind="stable")
@@ -38,7 +45,6 @@ class TruePoses:
         self.orientations = np.array(
             [(p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w) for p in poses]
         )[order]
-        self._period_ns = period_ns
 
     def at(self, stamp_ns: int) -> Pose:
         """Return the pose at a stamp: between two poses of a motion on the line between them, else the last one.

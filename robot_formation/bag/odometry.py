@@ -1,0 +1,81 @@
+"""Odometry of one topic of a bag, of which a long run has tens of thousands: poses of all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_formation.bag.definitions import jazzy_typestore
+from robot_formation.names import Message
+
+ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
+_HEAD = 4  # of a CDR message: what follows is aligned from here on
+_LITTLE_ENDIAN = 1
+_POSE_NUMBERS = 7  # x, y, z of the place, x, y, z, w of the orientation
+
+
+class Odometry(Sequence[Message]):
+    """The messages of a topic, decoded one by one when they are asked for.
+
+    Attributes:
+        stamps_ns: (n,) nanoseconds, as the messages tell.
+        positions_m: (n, 3) x, y, z.
+        orientations: (n, 4) x, y, z, w.
+
+    Args:
+        cdr: serialised messages, at least one.
+    """
+
+    def __init__(self, cdr: Sequence[bytes]) -> None:
+        self._cdr = cdr
+        columns = _columns(cdr)
+        if columns is None:
+            messages = [self[index] for index in range(len(cdr))]
+            poses = [message.pose.pose for message in messages]
+            stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages]
+            places = [(p.position.x, p.position.y, p.position.z) for p in poses]
+            turns = [(p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w) for p in poses]
+            columns = np.array(stamps, dtype=np.int64), np.hstack([np.array(places), np.array(turns)])
+        self.stamps_ns, poses_of = columns
+        self.positions_m, self.orientations = poses_of[:, :3], poses_of[:, 3:]
+
+    def __len__(self) -> int:
+        return len(self._cdr)
+
+    @overload
+    def __getitem__(self, index: int) -> Message: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Message]: ...
+
+    def __getitem__(self, index: int | slice) -> Message | Sequence[Message]:
+        if isinstance(index, slice):
+            return [self[each] for each in range(*index.indices(len(self)))]
+        return jazzy_typestore().deserialize_cdr(self._cdr[index], ODOMETRY_TYPE)
+
+
+def _columns(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
+    """Read stamps (n,) and poses (n, 7) of messages that have the same frames; None if they differ in anything else."""
+    if len({len(message) for message in cdr}) != 1 or cdr[0][:2] != bytes([0, _LITTLE_ENDIAN]):
+        return None
+    table = np.frombuffer(b"".join(cdr), np.uint8).reshape(len(cdr), -1)
+    begin = end = _HEAD + 8  # sec and nanosec come first, then both frames
+    for _ in range(2):
+        end = _aligned(end, 4)
+        if end + 4 > table.shape[1]:
+            return None
+        end += 4 + int.from_bytes(cdr[0][end : end + 4], "little")
+    first = _aligned(end, 8)
+    last = first + 8 * _POSE_NUMBERS
+    if last > table.shape[1] or (table[:, begin:end] != table[0, begin:end]).any() or (table[:, 1] != 1).any():
+        return None
+    stamps = table[:, _HEAD:begin].copy().view("<u4").astype(np.int64)
+    seconds = stamps[:, 0].astype(np.int32).astype(np.int64)  # signed, as the message has it
+    return seconds * 10**9 + stamps[:, 1], table[:, first:last].copy().view("<f8").astype(float)
+
+
+def _aligned(place: int, size: int) -> int:
+    return place + -(place - _HEAD) % size
