@@ -25,7 +25,7 @@ def repeated(command: str) -> Scenario:
         ("two", []),
         ("one", ["seed=7", "predictor.name=measured", "fine_tuner.mode=paper", "world.camera.mode=on_demand"]),
         ("one", ["name=it's one", "followers=2", "schedule=wave", "heading_deg=90.3", "blackouts=[[5, 3]]"]),
-        ("two", ["world.surface=ripple", "world.surface_parameters=[amplitude_m=0.004]", "start_x_m=1.3"]),
+        ("two", ["world.surface=ripple", "world.surface_parameters=[middle_m=0.1]", "start_x_m=1.3"]),
         ("two", ["leader.path=lemniscate", "seed=3", "leader.timesteps=12"]),
         ("two", ["leader.path=slalom", "leader.path_parameters=[period=7]", "predictor.forgetting=0.9"]),
         ("two", ["schedule=together", "spacing=delayed", "marker=tags", "predictor.forgetting=5e-2"]),
