@@ -39,9 +39,7 @@ def report_page(sources: Sequence[Path], namespace: str | None = None) -> str:
     runs = load_runs([source for source in sources if source not in folders], namespace)
     with temporary_folder(RUN) as folder:
         sections = list(_sections(runs, sweeps, folder))
-    lead = (
-        f"Report by formation {robot_formation.__version__}. Terms: lengths along u are to the right, along v forward."
-    )
+    lead = f"Report by robot_formation {robot_formation.__version__}. Along u is to the right, along v forward."
     return page(_title(runs, sweeps), lead, sections)
 
 
@@ -80,9 +78,8 @@ def _sections(runs: Sequence[Run], sweeps: Sequence[Sweep], folder: Path) -> Ite
             for each in sweep_sections(sweep, folder, level=2):
                 yield room.take(each, _NO_ROOM)
         else:
-            yield section(
-                f"Sweep: {sweep.name}", *(room.take(each, _NO_ROOM) for each in sweep_sections(sweep, folder, level=3))
-            )
+            inner = [room.take(each, _NO_ROOM) for each in sweep_sections(sweep, folder, level=3)]
+            yield section(f"Sweep: {sweep.name}", *inner)
     yield _cite()
 
 

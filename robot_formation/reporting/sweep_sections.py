@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 from robot_formation.analysis.conditions import conditions_text
 from robot_formation.analysis.sweep_summary import BASELINE, summarise
 from robot_formation.bag.provenance import versions
+from robot_formation.errors import FormationError
 from robot_formation.experiment.path_plan import STRAIGHT
 from robot_formation.experiment.sweep import CONDITIONS, Plan, Row, read_sweep
 from robot_formation.json_values import JsonObject
@@ -75,7 +76,7 @@ def sweep_sections(sweep: Sweep, folder: Path, level: int) -> Iterator[Element]:
     for number, (name, rows) in enumerate(groups.items(), 1):
         entries = [entry for entry in summary if group_name(entry) == name]
         shown = _distribution(f"sweep-{sweep.number}-{number}", name, rows, entries, seeds, folder)
-        yield section(name.capitalize(), shown, _table(name, entries), level=level)
+        yield section(f"{name[0].upper()}{name[1:]}", shown, _table(name, entries), level=level)
     command = element("pre", element("code", repeating_command(sweep.plan)), tabindex="0")
     yield section("Repeat this sweep", command, level=level)
     yield section("Versions", *_versions(), level=level)
@@ -92,7 +93,7 @@ def _what(sweep: Sweep) -> Iterator[Element]:
         ("surfaces", ", ".join(plan.surfaces)),
         ("predictors", ", ".join(plan.predictors)),
         ("seeds", f"{len(plan.seeds)}, from {min(plan.seeds)} to {max(plan.seeds)}"),
-        ("conditions", conditions_text(plan.conditions())),
+        ("conditions", _conditions(plan)),
         ("settings of all sweeps", ", ".join(CONDITIONS)),
         ("settings of this sweep", ", ".join(plan.settings) or "none"),
     ]
@@ -102,6 +103,13 @@ def _what(sweep: Sweep) -> Iterator[Element]:
         f"{lost} of {count} runs were lost: they did not come to their last timestep." if lost else "No run was lost."
     )
     yield paragraph(said, class_="answer")
+
+
+def _conditions(plan: Plan) -> str:
+    try:
+        return conditions_text(plan.conditions())
+    except FormationError:  # a track, predictor or setting that this version doesn't have
+        return "unknown to this version"
 
 
 def _reductions(sweep: Sweep, summary: Sequence[JsonObject], folder: Path) -> Iterator[Element]:

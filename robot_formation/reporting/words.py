@@ -65,10 +65,11 @@ def how_it_was_held(run: Run, follower: FollowerAnalysis) -> str:
     said = [f"{follower.name.replace('_', ' ').capitalize()} finished {finished}{of} timesteps."]
     rmse, largest = totals["formation_error_rmse_m"], totals["formation_error_max_m"]
     if rmse is not None and largest is not None:
-        share = f", {100.0 * largest / run.record.formation_distance_m:.0f} % of the distance between robots"
+        distance_m = run.record.formation_distance_m
+        share = f", {100.0 * largest / distance_m:.0f} % of the distance between robots" if distance_m > 0.0 else ""
         said.append(
             f"By ground truth its formation error was {number_text(rmse, _CM)} cm (RMSE) and "
-            f"at most {number_text(largest, _CM)} cm{share if run.record.formation_distance_m > 0.0 else ''}."
+            f"at most {number_text(largest, _CM)} cm{share}."
         )
     if totals["correction_m"] is not None:
         said.append(
