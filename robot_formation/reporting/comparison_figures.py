@@ -232,4 +232,6 @@ def _legend(figure: Any, runs: Sequence[Run]) -> None:
 
 
 def _short(name: str) -> str:
-    return name if len(name) <= 60 else f"{name[:28]} ... {name[-27:]}"
+    short = name if len(name) <= 60 else f"{name[:28]} ... {name[-27:]}"
+    printable = "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in short)
+    return printable.replace("$", r"\$")  # matplotlib takes what is between dollars for a formula

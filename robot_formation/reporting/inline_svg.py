@@ -17,6 +17,7 @@ _SVG = "{http://www.w3.org/2000/svg}"
 _LINK = "{http://www.w3.org/1999/xlink}href"
 _GREY = re.compile(r"#([0-9a-f]{2})\1\1(?![0-9a-f])", re.IGNORECASE)
 _REFERENCE = re.compile(r"url\(#([^)]+)\)")
+_NO_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # in names of scenarios, say
 _DROPPED = ("metadata", "style")  # links to vocabularies, and a rule that would hold for the whole page
 
 
@@ -56,7 +57,7 @@ def inlined(svg: str, name: str) -> Element:
         svg: the document, as matplotlib writes it.
         name: goes before its ids, which have to be unique in the page.
     """
-    root = ElementTree.fromstring(svg)
+    root = ElementTree.fromstring(_NO_XML.sub("\N{REPLACEMENT CHARACTER}", svg))
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in [f"{_SVG}{tag}" for tag in _DROPPED]:
