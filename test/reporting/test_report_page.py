@@ -172,12 +172,9 @@ def test_texts_from_outside_stay_texts(tmp_path: Path) -> None:
     parameters = json.dumps({"predictor": {"name": EVIL}, EVIL: {EVIL: 1}})
     details = {"scenario": EVIL, "predictor": EVIL, "surface": EVIL, "git_commit": EVIL, "parameters": parameters}
     details["versions"] = json.dumps({EVIL: EVIL})
-    odd = tmp_path / "a$b$c^{\x1b\x01"
-    bags = [
-        write_run(evil, STEPS, details=details),
-        write_run(odd, STEPS),
-        write_run(tmp_path / "b", STEPS, followers=2, lost=["follower_2"]),
-    ]
+    odd = write_run(tmp_path / "a$b$c^{\x1b\x01", STEPS)
+    two = write_run(tmp_path / "two", STEPS, followers=2, lost=["follower_2"])
+    bags = [write_run(evil, STEPS, details=details), odd, two]
     reader = Reader(report_page(bags))
     assert reader.scripts == 0
     assert "img" not in reader.tags
