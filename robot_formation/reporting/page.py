@@ -62,7 +62,7 @@ class PageError(FormationError):
     """A page can't be written."""
 
 
-class Room:
+class PageSpace:
     """Keeps a page below its largest size: tells what still fits."""
 
     def __init__(self, most_bytes: int = MOST_BYTES - _RESERVED) -> None:

@@ -12,7 +12,7 @@ from robot_formation.experiment.sweep import is_sweep
 from robot_formation.reporting.citation import bibtex
 from robot_formation.reporting.comparison_sections import anchor, comparison_sections
 from robot_formation.reporting.markup import element, paragraph, section
-from robot_formation.reporting.page import Room, page
+from robot_formation.reporting.page import PageSpace, page
 from robot_formation.reporting.run_sections import run_sections
 from robot_formation.reporting.runs import ReportError, Run, load_runs
 from robot_formation.reporting.sweep_sections import Sweep, load_sweep, sweep_sections
@@ -60,25 +60,25 @@ def _title(runs: Sequence[Run], sweeps: Sequence[Sweep]) -> str:
 
 
 def _sections(runs: Sequence[Run], sweeps: Sequence[Sweep], folder: Path) -> Iterator[Element]:
-    room, alone = Room(), len(runs) + len(sweeps) == 1
+    space, alone = PageSpace(), len(runs) + len(sweeps) == 1
     if len(runs) > 1:
         for each in comparison_sections(runs, folder):
-            yield room.take(each, _NO_ROOM)
+            yield space.take(each, _NO_ROOM)
     for run in runs:
         if alone:
             for each in run_sections(run, folder, level=2):
-                yield room.take(each, _NO_ROOM)
+                yield space.take(each, _NO_ROOM)
         else:
-            inner = [room.take(each, _NO_ROOM) for each in run_sections(run, folder, level=3)]
+            inner = [space.take(each, _NO_ROOM) for each in run_sections(run, folder, level=3)]
             whole = section(f"{run.label.capitalize()}: {run.name}", *inner)
             whole.set("id", anchor(run))
             yield whole
     for sweep in sweeps:
         if alone:
             for each in sweep_sections(sweep, folder, level=2):
-                yield room.take(each, _NO_ROOM)
+                yield space.take(each, _NO_ROOM)
         else:
-            inner = [room.take(each, _NO_ROOM) for each in sweep_sections(sweep, folder, level=3)]
+            inner = [space.take(each, _NO_ROOM) for each in sweep_sections(sweep, folder, level=3)]
             yield section(f"Sweep: {sweep.name}", *inner)
     yield _cite()
 

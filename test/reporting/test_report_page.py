@@ -21,7 +21,7 @@ from robot_formation.experiment.sweep import read_sweep
 from robot_formation.reporting.citation import bibtex
 from robot_formation.reporting.inline_svg import inlined
 from robot_formation.reporting.markup import element, fill, page_text, section
-from robot_formation.reporting.page import Room, write_page
+from robot_formation.reporting.page import PageSpace, write_page
 from robot_formation.reporting.report import default_path, report_page
 from robot_formation.reporting.runs import load_runs
 from robot_formation.reporting.sweep_sections import repeating_command
@@ -183,11 +183,11 @@ def test_texts_from_outside_stay_texts(tmp_path: Path) -> None:
 
 
 def test_a_page_takes_what_fits() -> None:
-    room = Room(1000)
+    space = PageSpace(1000)
     small, large = section("Small", "x" * 400), section("Large", "x" * 700)
-    assert room.take(small, "no room") is small
-    assert room.take(large, "no room").text == "no room"
-    assert room.take(small, "no room") is small
+    assert space.take(small, "no room") is small
+    assert space.take(large, "no room").text == "no room"
+    assert space.take(small, "no room") is small
 
 
 def test_a_damaged_sweep_or_a_wrong_source_is_told_in_a_line(
