@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robot_formation import names
 from robot_formation.analysis.displacement_log import DisplacementLog
@@ -302,15 +303,17 @@ def _overhead(
         moved[0] = moved[1]
         stamps = np.array([_stamp_ns(message) for message in told], dtype=np.int64)[moved]
         seen = places[moved]
-        if isinstance(truth, Odometry):
-            true_stamps = truth.stamps_ns
-        else:
-            true_stamps = np.array([_stamp_ns(message) for message in truth], dtype=np.int64)
+        odometry = truth if isinstance(truth, Odometry) else None
+        true_stamps = np.array([_stamp_ns(m) for m in truth]) if odometry is None else odometry.stamps_ns
         order = np.argsort(true_stamps, kind="stable")
         # A robot that stands says nothing, so its last word before the picture holds.
         index = np.searchsorted(true_stamps[order], stamps, side="right") - 1
         known = index >= 0
-        dots = np.array([_dot(truth[entry].pose.pose, dot_height_m) for entry in order[index[known]]])
+        entries = order[index[known]]
+        if odometry is None:
+            dots = np.array([_dot(truth[entry].pose.pose, dot_height_m) for entry in entries])
+        else:
+            dots = _dots(odometry.positions_m[entries], odometry.orientations[entries], dot_height_m)
         tracks[robot] = OverheadTrack(stamps[known], seen[known].reshape(-1, 3), dots.reshape(-1, 3))
     return tracks
 
@@ -325,6 +328,13 @@ def _dot(pose: Message, height_m: float) -> tuple[float, float, float]:
     x, y, z = _place(pose.position)
     up_x, up_y = 2.0 * (q.x * q.z + q.y * q.w), 2.0 * (q.y * q.z - q.x * q.w)
     return (x + height_m * up_x, y + height_m * up_y, z + height_m * (1.0 - 2.0 * (q.x * q.x + q.y * q.y)))
+
+
+def _dots(places_m: NDArray[np.float64], turns: NDArray[np.float64], height_m: float) -> NDArray[np.float64]:
+    """Return the places (n, 3) of a robot's dot at poses (n, 3) and (n, 4): see `_dot`."""
+    x, y, z, w = turns.T
+    up = np.column_stack([2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)])
+    return places_m + height_m * up
 
 
 def read_ground(marker: Message) -> Ground | None:

@@ -64,13 +64,13 @@ def _columns(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float6
     table = np.frombuffer(b"".join(cdr), np.uint8).reshape(len(cdr), -1)
     begin = end = _HEAD + 8  # sec and nanosec come first, then both frames
     for _ in range(2):
-        end = _aligned(end, 4)
-        if end + 4 > table.shape[1]:
+        start = _aligned(end, 4)  # bytes that align hold anything
+        end = start + 4 + int.from_bytes(cdr[0][start : start + 4], "little")
+        if end > table.shape[1] or (table[:, start:end] != table[0, start:end]).any():
             return None
-        end += 4 + int.from_bytes(cdr[0][end : end + 4], "little")
     first = _aligned(end, 8)
     last = first + 8 * _POSE_NUMBERS
-    if last > table.shape[1] or (table[:, begin:end] != table[0, begin:end]).any() or (table[:, 1] != 1).any():
+    if last > table.shape[1] or (table[:, 1] != _LITTLE_ENDIAN).any():
         return None
     stamps = table[:, _HEAD:begin].copy().view("<u4").astype(np.int64)
     seconds = stamps[:, 0].astype(np.int32).astype(np.int64)  # signed, as the message has it

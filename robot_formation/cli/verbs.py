@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from robot_formation.cli import (
     analyze,
+    animate,
     calibrate,
     compare,
     detect,
@@ -25,6 +26,6 @@ from robot_formation.cli import (
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, compare, report, view, path, predict, record, play, info, recover, replay),
+    *(run, sweep, list_, analyze, compare, report, view, animate, path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )

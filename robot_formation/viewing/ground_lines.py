@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.tri import LinearTriInterpolator, Triangulation
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator
 
 from robot_formation.analysis.run_record import Ground
 
@@ -48,15 +48,16 @@ class GroundHeight:
     """Heights of a mesh's surface, metres; level ground at 0 without one, and beside it."""
 
     def __init__(self, ground: Ground | None = None) -> None:
-        self._interpolate = (
-            None if ground is None else LinearNDInterpolator(ground.vertices_m[:, :2], ground.vertices_m[:, 2], 0.0)
-        )
+        self._interpolate: LinearTriInterpolator | None = None
+        if ground is not None:
+            x_m, y_m, z_m = ground.vertices_m.T
+            self._interpolate = LinearTriInterpolator(Triangulation(x_m, y_m, ground.triangles), z_m)
 
     def of(self, points_m: Array) -> Array:
         """Return the heights (n,) below points (n, 2)."""
         if self._interpolate is None:
             return np.zeros(len(points_m))
-        return np.asarray(self._interpolate(points_m), float)
+        return np.asarray(self._interpolate(points_m[:, 0], points_m[:, 1]).filled(0.0), float)
 
     def on_ground(self, points_m: Array, above_m: float = 0.0) -> Array:
         """Put points (n, 2) on the ground, or so far above it; return them (n, 3)."""

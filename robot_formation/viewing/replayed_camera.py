@@ -14,9 +14,7 @@ from robot_formation import names
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.message_recorder import METADATA_NAME, own_stamp
-from robot_formation.bag.run_details import node_parameters
-from robot_formation.components.node_parameters import WorldNodeParameters
-from robot_formation.parameters import from_mapping, specs
+from robot_formation.viewing.recorded_world import recorded_world, tells_world
 from robot_formation.viewing.true_poses import true_poses
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.recorded_messages import read_blocks, read_image
@@ -104,14 +102,9 @@ class _Renderer:
     """Pictures of a follower's camera by the world's own camera and sensor, before noise and flicker."""
 
     def __init__(self, bag: FormationBag, robot: str, first_frame_ns: int) -> None:
-        told = node_parameters(bag.metadata(METADATA_NAME)).get("world", {})
-        self.known_world = bool(told)
-        known = specs(WorldNodeParameters)
-        parameters = from_mapping(
-            WorldNodeParameters,
-            {name: value for name, value in told.items() if name in known},
-            where=f"{bag.path}: world",
-        )
+        details = bag.metadata(METADATA_NAME)
+        self.known_world = tells_world(details)
+        parameters = recorded_world(details, bag.path)
         poses = true_poses(bag, parameters.robots, 10**9 // parameters.state_rate_hz)
         if robot not in poses:
             topics = f"'{names.camera_image().of(robot)}' or '{names.ground_truth_odom(robot).of()}'"

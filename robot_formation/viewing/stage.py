@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from robot_formation import names
 from robot_formation.analysis.run_record import Ground
+from robot_formation.analysis.style import FOLLOWER_COLOURS, LEADER_COLOUR
 from robot_formation.geometry.orientation import Quaternion, Vector
 from robot_formation.geometry.se2 import Motion
 from robot_formation.viewing.ground_lines import GroundHeight, contour_lines
@@ -18,9 +19,6 @@ from robot_formation.viewing.lens import Lens
 from robot_formation.viewing.moment import Forecast, Moment, Picture, RobotPose
 from robot_formation.viewing.robot_shape import Link, Part, Rgb
 
-# Okabe and Ito's palette, safe for colour-blind readers; leader orange as in the pictures of the analysis.
-_LEADER_RGB: Rgb = (230, 159, 0)
-_FOLLOWER_RGB: tuple[Rgb, ...] = ((0, 114, 178), (0, 158, 115), (204, 121, 167), (86, 180, 233))
 _GROUND_RGB: Rgb = (206, 210, 200)
 _LOW_RGB, _HIGH_RGB = np.array((70, 90, 120)), np.array((190, 120, 60))
 _LIFT_M = 0.004
@@ -40,10 +38,10 @@ _BESIDE_M = 0.015
 
 def robot_rgb(robot: str) -> Rgb:
     """Return the colour that a robot's path, place and name have."""
-    if robot == names.LEADER:
-        return _LEADER_RGB
     number = robot.rpartition("_")[2]
-    return _FOLLOWER_RGB[(int(number) - 1) % len(_FOLLOWER_RGB) if number.isdigit() else 0]
+    place = (int(number) - 1) % len(FOLLOWER_COLOURS) if number.isdigit() else 0
+    red, green, blue = bytes.fromhex((LEADER_COLOUR if robot == names.LEADER else FOLLOWER_COLOURS[place])[1:])
+    return red, green, blue
 
 
 class Stage:

@@ -62,6 +62,13 @@ class TruePoses:
         x, y, z, w = orientation.tolist()
         return Pose((float(position[0]), float(position[1]), float(position[2])), (x, y, z, w))
 
+    def moves_at(self, stamp_ns: int) -> bool:
+        """Return whether the robot is in a motion."""
+        index = int(np.searchsorted(self.stamps_ns, stamp_ns, side="left"))
+        if not 0 < index < len(self.stamps_ns):
+            return False
+        return int(self.stamps_ns[index] - self.stamps_ns[index - 1]) <= self._period_ns
+
 
 def _between(one: NDArray[np.float64], other: NDArray[np.float64], share: float) -> NDArray[np.float64]:
     """Turn from one orientation by a share of the small way to another."""

@@ -11,7 +11,8 @@ from repository import ROOT
 from robot_formation import conversions, names
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
-from robot_formation.bag.reader import BagMessage, read_bag
+from robot_formation.bag.reader import read_bag
+from robot_formation.bag.source import RawMessage
 from robot_formation.viewing.live_moments import LiveMoments
 from robot_formation.viewing.run_moments import RunMoments
 
@@ -116,10 +117,8 @@ class WithoutTruth(FormationBag):
     def topics(self) -> dict[str, str]:
         return {name: kind for name, kind in super().topics.items() if "ground_truth" not in name}
 
-    def messages(
-        self, topics: Collection[str], start_ns: int | None = None, stop_ns: int | None = None
-    ) -> Iterator[BagMessage]:
-        return super().messages([topic for topic in topics if topic in self.topics], start_ns, stop_ns)
+    def raw_messages(self, topics: Collection[str]) -> Iterator[RawMessage]:
+        return super().raw_messages([topic for topic in topics if topic in self.topics])
 
 
 def test_a_bag_without_true_poses_is_refused_in_one_line(bag: FormationBag) -> None:

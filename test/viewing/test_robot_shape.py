@@ -39,7 +39,7 @@ def test_the_markers_faces_have_their_colours() -> None:
     target = next(part for part in parts if part.place_m[1] < -0.02)
     front = next(part for part in parts if part.place_m[0] > 0.02)
     rear = next(part for part in parts if part.place_m[0] < -0.02)
-    brightest = [max(range(3), key=lambda channel, face=face: face.rgb[channel]) for face in (target, front, rear)]
+    brightest = [face.rgb.index(max(face.rgb)) for face in (target, front, rear)]
     assert brightest == [0, 1, 2]  # red, green, blue
 
 
