@@ -6,6 +6,7 @@ from robot_formation.cli import (
     analyze,
     animate,
     calibrate,
+    compare,
     detect,
     doctor,
     info,
@@ -16,6 +17,7 @@ from robot_formation.cli import (
     record,
     recover,
     replay,
+    report,
     run,
     sweep,
     teach,
@@ -24,6 +26,6 @@ from robot_formation.cli import (
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, view, animate, path, predict, record, play, info, recover, replay),
+    *(run, sweep, list_, analyze, compare, report, view, animate, path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )

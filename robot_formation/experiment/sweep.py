@@ -238,13 +238,7 @@ class Table:
             raise SweepError(f"{folder} is not empty and holds no sweep; choose another --out")
         folder.mkdir(parents=True, exist_ok=True)
         write_record(record, asdict(plan))
-        self._table = ResumableTable(
-            folder / RUNS_NAME,
-            Row,
-            SweepError,
-            "no table of a sweep's runs; choose another --out",
-            added={"path": STRAIGHT},
-        )
+        self._table = _runs_table(folder, "choose another --out")
         self.rows: dict[Task, Row] = {}
         if self._table.path.exists():
             self.rows = {row.task: row for row in self._table.read()}
@@ -273,6 +267,38 @@ def _difference(earlier: Sequence[str], now: Sequence[str]) -> str:
     said = [f"it was made with --set {' --set '.join(gone)}"] if gone else []
     said += [f"{'and' if gone else 'it was made'} without --set {' --set '.join(new)}"] if new else []
     return " ".join(said) or f"it was made with them in another order, --set {' --set '.join(earlier)}"
+
+
+def is_sweep(folder: Path) -> bool:
+    """Return whether a folder is that of a sweep."""
+    return (folder / PLAN_NAME).exists() and (folder / RUNS_NAME).exists()
+
+
+def read_sweep(folder: Path) -> tuple[Plan, list[Row]]:
+    """Read a sweep's folder: its latest plan, and those of its runs that are there, in order.
+
+    Raises:
+        SweepError: if the folder holds no sweep, none of its runs is there, or a file is damaged.
+    """
+    remedy = "give a folder that 'formation sweep' made"
+    path = folder / PLAN_NAME
+    try:
+        record = read_record(path)
+        names = ("tracks", "surfaces", "predictors", "settings")
+        tracks, surfaces, predictors, settings = (tuple(map(str, record[name])) for name in names)
+        paths = tuple(map(str, record.get("paths", (STRAIGHT,))))
+        plan = Plan(tracks, surfaces, predictors, tuple(map(int, record["seeds"])), settings, paths)
+    except (ValueError, KeyError, TypeError):
+        raise SweepError(f"{path}: no record of a sweep; {remedy}") from None
+    rows = chosen(plan, {row.task: row for row in _runs_table(folder, remedy).read()})
+    if not rows:
+        raise SweepError(f"{folder / RUNS_NAME} holds no run of the sweep yet; let 'formation sweep' go on")
+    return plan, rows
+
+
+def _runs_table(folder: Path, remedy: str) -> ResumableTable[Row]:
+    foreign = f"no table of a sweep's runs; {remedy}"
+    return ResumableTable(folder / RUNS_NAME, Row, SweepError, foreign, added={"path": STRAIGHT})
 
 
 def remaining(plan: Plan, rows: Mapping[Task, Row]) -> list[Task]:
