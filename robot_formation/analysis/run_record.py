@@ -16,6 +16,8 @@ from robot_formation.schedule.schedules import Spacing
 
 DOT_HEIGHT_M = 0.216
 """Height of the reference dot above base_link (paper: the robot's height)."""
+BODY_M = (0.365, 0.238)
+"""Length and width of a robot (paper)."""
 
 
 @dataclass(frozen=True)
@@ -153,23 +155,29 @@ class RunRecord:
     @property
     def dot_height_m(self) -> float:
         """Height of the reference dot above base_link, metres: what the run says, else the paper's robot's."""
-        try:
-            said = float(node_parameters(self.details)["world"]["marker.top_m"])
-        except (KeyError, ValueError, TypeError, OverflowError):
-            return DOT_HEIGHT_M
-        return said if math.isfinite(said) else DOT_HEIGHT_M
+        return self._said("world", "marker.top_m", DOT_HEIGHT_M)
+
+    @property
+    def body_m(self) -> tuple[float, float]:
+        """Length and width of a robot, metres: what the run says, else the paper's."""
+        length, width = (f"chassis.{side}_m" for side in ("length", "width"))
+        return self._said("world", length, BODY_M[0]), self._said("world", width, BODY_M[1])
 
     @property
     def formation_distance_m(self) -> float:
         """Distance between neighbours in formation, metres: the run's fine-tuner's, else the paper's."""
-        try:
-            said = float(node_parameters(self.details)["fine_tuner"]["formation_distance_m"])
-        except (KeyError, ValueError, TypeError, OverflowError):
-            return FORMATION_DISTANCE_M
-        return said if math.isfinite(said) else FORMATION_DISTANCE_M
+        return self._said("fine_tuner", "formation_distance_m", FORMATION_DISTANCE_M)
 
     @property
     def delayed(self) -> bool:
         """Whether followers keep their places beside where their neighbours stood one timestep earlier."""
         fine_tuner = node_parameters(self.details).get("fine_tuner", {})
         return fine_tuner.get("spacing") == Spacing.DELAYED.value
+
+    def _said(self, node: str, name: str, default: float) -> float:
+        """Return a node's parameter as the run says it; the default if it says none or nonsense."""
+        try:
+            said = float(node_parameters(self.details)[node][name])
+        except (KeyError, ValueError, TypeError, OverflowError):
+            return default
+        return said if math.isfinite(said) else default
