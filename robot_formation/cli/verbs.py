@@ -9,6 +9,7 @@ from robot_formation.cli import (
     doctor,
     info,
     list_,
+    paper,
     path,
     play,
     predict,
@@ -22,6 +23,6 @@ from robot_formation.cli import (
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, path, predict, record, play, info, recover, replay),
+    *(run, sweep, paper, list_, analyze, path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )

@@ -30,7 +30,7 @@ LAYERS = [
     ),
     *((room,) for room in ("drive", "leader", "alignment", "follower", "analysis")),
     *((room,) for room in ("conversions", "components")),
-    *((room,) for room in ("calibration", "experiment", "nodes", "launching", "cli")),
+    *((room,) for room in ("calibration", "experiment", "nodes", "launching", "paper", "cli")),
 ]
 LEVEL = {area: level for level, areas in enumerate(LAYERS) for area in areas}
 ROS = re.compile(
