@@ -117,9 +117,10 @@ def trajectory_panel(
     _limits(axes, record, whole_plate=whole_plate)
     if record.ground is not None:
         _contours(axes, record.ground, [track.positions_m[:, :2] for track in record.tracks.values()])
+    size = 0.6 if whole_plate else 1.0
     for robot in record.tracks:
-        _path(axes, record, robot)
-    _places(axes, record)
+        _path(axes, record, robot, size)
+    _places(axes, record, size)
     axes.plot([], [], ":", color="0.4", linewidth=1.0, label="body at the start")
     axes.plot([], [], "s", color="0.75", markersize=9, label="body at the end")
     seen = [track.seen_m[:, :2] for track in record.overhead.values()]
@@ -271,7 +272,7 @@ def _rectangle(low: Sequence[float], high: Sequence[float]) -> tuple[list[float]
     return [low[0], high[0], high[0], low[0], low[0]], [low[1], low[1], high[1], high[1], low[1]]
 
 
-def _path(axes: Axes, record: RunRecord, robot: str) -> None:
+def _path(axes: Axes, record: RunRecord, robot: str, size: float) -> None:
     """Draw a robot's way with its direction, a dot where it ended each timestep, and its body at start and end."""
     track, colour = record.tracks[robot], robot_colour(robot)
     xy = track.positions_m[:, :2] * _CM
@@ -280,11 +281,11 @@ def _path(axes: Axes, record: RunRecord, robot: str) -> None:
     ends = record.leader_moved if follower is None else follower.displacements
     at_rest = [(p.x_m * _CM, p.y_m * _CM) for end in ends if (p := track.at(end.stamp_ns)) is not None]
     stops = np.array(at_rest).reshape(-1, 2)
-    axes.plot(*stops.T, "o", color=colour, markersize=3.5, zorder=3)
+    axes.plot(*stops.T, "o", color=colour, markersize=3.5 * size, zorder=3)
     for index, style in ((0, {"facecolor": "none", "linestyle": ":"}), (-1, {"facecolor": colour, "alpha": 0.22})):
         x_m, y_m = track.positions_m[index, :2].tolist()
         _body(axes, record, Motion(x_m, y_m, float(track.yaws_rad[index])), colour, style)
-    _arrow(axes, stops, colour)
+    _arrow(axes, stops, colour, size)
 
 
 def _body(axes: Axes, record: RunRecord, where: Motion, colour: str, style: dict[str, Any]) -> None:
@@ -297,19 +298,21 @@ def _body(axes: Axes, record: RunRecord, where: Motion, colour: str, style: dict
     axes.add_patch(Polygon(placed, edgecolor=colour, linewidth=0.9, zorder=2, **style))
 
 
-def _arrow(axes: Axes, stops: NDArray[np.float64], colour: str) -> None:
+def _arrow(axes: Axes, stops: NDArray[np.float64], colour: str, size: float) -> None:
     """Point along the way, from one stop (n, 2) to the next, a third of them from the start."""
     if len(stops) < 2:
         return
     tail, head = stops[(len(stops) - 2) // 3 :][:2]
-    arrow = {"arrowstyle": "-|>,head_width=0.4,head_length=0.8", "color": colour, "linewidth": 1.6, "shrinkA": 0}
+    head_size = f"head_width={0.4 * size},head_length={0.8 * size}"
+    arrow = {"arrowstyle": f"-|>,{head_size}", "color": colour, "linewidth": 1.6 * size, "shrinkA": 0}
     axes.annotate("", head, tail, arrowprops=arrow, zorder=5)
 
 
-def _places(axes: Axes, record: RunRecord) -> None:
+def _places(axes: Axes, record: RunRecord, size: float) -> None:
     """Mark each follower's place in formation at the end of every timestep."""
     found = [place for follower in record.followers for place in _places_of(record, follower)]
-    style = {"markerfacecolor": "none", "markeredgecolor": BLACK, "markersize": 6.5, "markeredgewidth": 0.8}
+    style = {"markerfacecolor": "none", "markeredgecolor": BLACK, "markersize": 6.5 * size}
+    style["markeredgewidth"] = 0.8 * size
     _mark(axes, [(place.x_m, place.y_m) for place in found], marker="D", label="place in formation", **style)
 
 

@@ -71,11 +71,12 @@ def _panel(axes: Axes, runs: Sequence[RunRow], predictors: Sequence[str], highes
     seeds = sorted({row.seed for row in runs})
     strip = 1.14 * highest
     heights = np.array([[_height(by_predictor[name].get(seed), strip) for name in predictors] for seed in seeds])
+    aside = np.linspace(-_SPREAD, _SPREAD, len(seeds)) * (len(seeds) > 1)
     for number, line in enumerate(heights[:_MOST_LINES]):
         label = "one seed" if number == 0 else None
-        axes.plot(range(len(predictors)), line, color="0.80", linewidth=0.7, zorder=1, label=label)
+        axes.plot(np.arange(len(predictors)) + aside[number], line, color="0.80", linewidth=0.7, zorder=1, label=label)
     for place, name in enumerate(predictors):
-        _points(axes, place, heights[:, place], strip)
+        _points(axes, place + aside, heights[:, place], strip)
         _summary(axes, place, by_predictor[name], highest)
     if (heights == strip).any():
         axes.axhspan(1.07 * highest, 1.21 * highest, color="0.95", zorder=0, linewidth=0)
@@ -93,16 +94,15 @@ def _height(row: RunRow | None, strip: float) -> float:
     return np.nan if row.correction_m is None else row.correction_m * _CM
 
 
-def _points(axes: Axes, place: int, heights: NDArray[np.float64], strip: float) -> None:
+def _points(axes: Axes, places: NDArray[np.float64], heights: NDArray[np.float64], strip: float) -> None:
     """Draw a predictor's runs side by side, in the order of their seeds; lost ones as crosses."""
-    aside = place + np.linspace(-_SPREAD, _SPREAD, len(heights)) * (len(heights) > 1)
     lost = heights == strip
     style: dict[str, Any] = {"linestyle": "none", "markersize": 3.5, "zorder": 2}
-    axes.plot(aside[~lost], heights[~lost], "o", color=BLUE, alpha=0.55, label="run", **style)
+    axes.plot(places[~lost], heights[~lost], "o", color=BLUE, alpha=0.55, label="run", **style)
     if lost.any():
-        axes.plot(aside[lost], heights[lost], "x", color=LOST_COLOUR, label="lost run", **style)
+        axes.plot(places[lost], heights[lost], "x", color=LOST_COLOUR, label="lost run", **style)
         count = f"{int(lost.sum())} of {int(np.isfinite(heights).sum())}"
-        axes.annotate(count, (place, strip), (0, 7), textcoords="offset points", ha="center", fontsize=8)
+        axes.annotate(count, (float(places.mean()), strip), (0, 7), textcoords="offset points", ha="center", fontsize=8)
 
 
 def _summary(axes: Axes, place: int, runs: Mapping[int, RunRow], highest: float) -> None:

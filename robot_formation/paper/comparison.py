@@ -117,7 +117,8 @@ def _trajectories(results: Results) -> dict[str, Ours]:
             found[f"timesteps_{track}"] = Ours(planned, reason="The runs were shortened by --set.")
     found["step"] = Ours(
         float(np.mean(steps)) if steps else None,
-        reason="As the leader's own sensing wheels measure it, slip on slopes and the motors' scatter included.",
+        reason="The motors' curves are those of a level floor. Downhill the robots coast farther, uphill less, and the "
+        "tracks begin downhill.",
     )
     seeds = len({row.seed for row in results.rows})
     measured = [row for row in results.rows if row.predictor == "measured"]

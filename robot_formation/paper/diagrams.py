@@ -24,27 +24,26 @@ def draw_scheme(path: str | Path) -> Path:
     Raises:
         AnalysisError: the file can't be written.
     """
-    figure, axes = _canvas(9.6, 4.0, (0.0, 96.0), (0.0, 40.0))
+    figure, axes = _canvas(9.6, 4.6, (-1.0, 95.0), (0.0, 52.0))
     boxes = {
         "leader": (10, 30, "leader moves;\nits tick t arrives", "move"),
         "predict": (34, 30, "go as forecast:\nK x(t-1), or the previous\ndisplacement", "move"),
         "look": (58, 30, "look: blocks\nof the Pixy2", "look"),
         "aligned": (82, 30, "inside the\ntolerances?", "decide"),
-        "correct": (70, 10, "one correcting\nmove", "move"),
-        "sum": (46, 10, "sum of all moves:\ndisplacement x(t) = (u, v)", "plain"),
-        "learn": (18, 10, "update K with the pair\n(x(t-1), x(t)); forecast\nx(t+1); tick to the leader", "predict"),
+        "correct": (70, 46, "one correcting\nmove", "move"),
+        "sum": (82, 10, "sum of all moves:\ndisplacement\nx(t) = (u, v)", "plain"),
+        "learn": (46, 10, "update K with the pair\n(x(t-1), x(t)); forecast\nx(t+1); tick to the leader", "predict"),
     }
-    for x, y, text, kind in boxes.values():
-        _box(axes, x, y, 20, 10, text, kind)
+    for name, (x, y, text, kind) in boxes.items():
+        _box(axes, x, y, 24 if name == "learn" else 20, 10, text, kind)
     for start, end in (("leader", "predict"), ("predict", "look"), ("look", "aligned")):
         _arrow(axes, (boxes[start][0] + 10, 30), (boxes[end][0] - 10, 30))
-    _arrow(axes, (84, 25), (78, 15), "no", (83, 18))
-    _arrow(axes, (66, 15), (60, 25), "", (0, 0))
-    axes.annotate("", (46, 15), (76, 25), arrowprops={"arrowstyle": "->", "connectionstyle": "arc3,rad=-0.05"})
-    axes.text(54, 19.3, "yes", fontsize=9, color="0.3")
-    _arrow(axes, (36, 10), (28, 10))
-    _arrow(axes, (14, 15), (10, 25))
-    axes.text(18, 2.0, "collection phase, t = 1 to 3: the leader's 5 cm, then the previous displacement", fontsize=8)
+    _arrow(axes, (82, 35.5), (77, 40.5), "no", (81.5, 37.5))
+    _arrow(axes, (63, 40.5), (58, 35.5))
+    _arrow(axes, (82, 24.5), (82, 15.5), "yes", (83, 19.5))
+    _arrow(axes, (71.5, 10), (58.5, 10))
+    _arrow(axes, (33.5, 10), (10, 24.5))
+    axes.text(-1, 1.0, "collection phase, t = 1 to 3: the leader's 5 cm, then the previous displacement", fontsize=8)
     return save_figure(figure, path)
 
 
@@ -75,15 +74,17 @@ def draw_visual_flow(parameters: AlignmentParameters, path: str | Path) -> Path:
         (f"sides differ by more than {p.side_tolerance_px:g} px", f"turn by {math.degrees(p.turn_step_rad):g} degrees"),
         ("none of these", "aligned: end of the timestep"),
     )
-    axes.text(69, 60, "entering the Target area", ha="center", fontweight="bold")
+    axes.text(69, 60.5, "entering the Target area", ha="center", fontweight="bold")
     for number, (seen, move) in enumerate(entering):
-        _rule(axes, 55.5 - 5.2 * number, seen, move, "plain")
-    axes.text(69, 24, "Target block alone: fine-tuning, the first that holds", ha="center", fontweight="bold")
+        _rule(axes, 54.2 - 5.2 * number, seen, move, "plain")
+    axes.text(69, 23.2, "Target block alone: fine-tuning, the first that holds", ha="center", fontweight="bold")
     for number, (seen, move) in enumerate(fine_tuning):
-        _rule(axes, 19.5 - 5.2 * number, seen, move, "predict")
+        _rule(axes, 18.9 - 5.2 * number, seen, move, "predict")
     _arrow(axes, (25, 34), (33, 42))
     _arrow(axes, (25, 28), (33, 14))
-    axes.annotate("after each move", (14, 36), (14, 52), arrowprops={"arrowstyle": "->"}, ha="center")
+    axes.annotate("start, and after each move", (14, 36.5), (14, 50), arrowprops={"arrowstyle": "->"}, ha="center")
+    axes.text(50, 57.6, "blocks seen", ha="center", fontsize=9, color="0.3")
+    axes.text(86.5, 57.6, "move", ha="center", fontsize=9, color="0.3")
     return save_figure(figure, path)
 
 

@@ -46,8 +46,10 @@ def draw_trajectories(drawn: Drawn, path: str | Path) -> Path:
             axes.set(xlabel="", ylabel="")
             where = ", own start" if start == own else ""
             axes.set_title(f"({next(letters)}) track {track}{where}\n{_NAMES[predictor]}")
-    figure.supxlabel("x (cm)", fontsize=10)
-    figure.supylabel("y (cm)", fontsize=10)
+    for axes in panels[-1]:
+        axes.set_xlabel("x (cm)")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("y (cm)")
     handles = {h.get_label(): h for axes in panels.flat for h in axes.get_legend_handles_labels()[0]}
     legend_below(figure, list(handles.values()), 7)
     return save_figure(figure, path)
@@ -73,7 +75,8 @@ def draw_correction_pairs(drawn: Drawn, path: str | Path) -> Path:
             axes.set_title(f"track {track}, {_NAMES[predictor]}: {_total(follower)}", loc="left")
         panels[-1, column].set_xlabel("timestep")
     panels[0, 0].set_ylim(0.0, 1.12 * highest)
-    figure.supylabel("correction distance (cm)", fontsize=10)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("correction distance (cm)")
     handles = {h.get_label(): h for axes in panels.flat for h in axes.get_legend_handles_labels()[0]}
     legend_below(figure, list(handles.values()), 4)
     return save_figure(figure, path)
@@ -93,17 +96,22 @@ def draw_manifold(surface: Surface, size_m: float, path: str | Path) -> Path:
     x, y = np.meshgrid(ticks, ticks)
     solid.plot_surface(x * _CM, y * _CM, surface.heights(x, y) * _MM, cmap="cividis", linewidth=0, antialiased=True)
     solid.set(xlabel="x (cm)", ylabel="y (cm)", zlim=(0.0, 220.0))
+    solid.set(xticks=(0, 50, 100, 150), yticks=(0, 50, 100, 150), zticks=(0, 100, 200))
     solid.set_zlabel("height (mm)")
     solid.set_box_aspect((1.0, 1.0, 0.35), zoom=0.85)
     middle = np.full_like(ticks, 0.5 * size_m)
     half = 0.5 * size_m
-    section.plot((ticks - half) * _MM, surface.heights(ticks, middle) * _MM, color=FOLLOWER_COLOURS[0], label="middle")
+    section.plot(
+        (ticks - half) * _MM,
+        surface.heights(ticks, middle) * _MM,
+        color=FOLLOWER_COLOURS[0],
+        label="through the middle, along x",
+    )
     corners = np.sqrt(2.0) * (ticks - half) * _MM
-    section.plot(corners, surface.heights(ticks, ticks) * _MM, "--", color=ORANGE, label="corner to corner")
-    for place, height in ((0.0, surface.height(half, half)), (corners[-1], surface.height(size_m, size_m))):
-        section.annotate(
-            f"{height * _MM:.1f} mm", (place, height * _MM), (0, 6), textcoords="offset points", ha="center"
-        )
+    section.plot(corners, surface.heights(ticks, ticks) * _MM, "--", color=ORANGE, label="from corner to corner")
+    lowest, highest = surface.height(half, half) * _MM, surface.height(size_m, size_m) * _MM
+    for height, place, aside in ((lowest, 0.0, (0, -14)), (highest, corners[-1], (-38, -3))):
+        section.annotate(f"{height:.1f} mm", (place, height), aside, textcoords="offset points", ha="center")
     section.set(xlabel="distance from the middle (mm)", ylabel="height (mm)", ylim=(0.0, None))
     section.margins(x=0.08)
     section.legend(loc="lower right")
@@ -167,9 +175,10 @@ def _formation(axes: Axes, body_m: tuple[float, float], distance_m: float) -> No
     arrow = {"arrowstyle": "<->", "color": "0.2", "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (0.0, -24.0), (distance, -24.0), arrowprops=arrow)
     axes.text(distance / 2, -25.0, f"{distance:g} cm", ha="center", va="top")
-    axes.annotate("v", (distance, 36.0), (distance, 8.0), arrowprops={"arrowstyle": "->"}, ha="center")
-    axes.annotate("u", (distance + 30.0, 0.0), (distance, 0.0), arrowprops={"arrowstyle": "->"}, va="center")
-    axes.set(xlim=(-30.0, 68.0), ylim=(-32.0, 40.0), aspect="equal")
+    for name, aside, ahead in (("v", 0.0, 34.0), ("u", 28.0, 0.0)):
+        axes.annotate("", (distance + aside, ahead), (distance, 0.0), arrowprops={"arrowstyle": "->"})
+        axes.text(distance + 1.08 * aside, 1.08 * ahead, name, ha="center", va="center")
+    axes.set(xlim=(-28.0, 64.0), ylim=(-32.0, 40.0), aspect="equal")
     axes.set_axis_off()
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=3, fontsize=8)
 

@@ -100,7 +100,10 @@ class Work:
 
         Raises:
             PaperError: if it holds something else, or was measured in another way.
+            FormationError: on a setting that can't be.
         """
+        for plan in self.plans.values():
+            plan.check()
         record = self.folder / RECORD_NAME
         own = {"repeats": self.repeats, "step_m": self.step_m, "settings": list(self.settings)}
         if force:
@@ -166,8 +169,6 @@ def carry_out_work(work: Work, picture_format: str, say: Callable[[str], None]) 
     Raises:
         FormationError: on a setting that can't be, or work that can't be done.
     """
-    for plan in work.plans.values():
-        plan.check()
     bench = scenarios.with_surface(scenarios.load_track("two"), "plane")
     bench.block_detector.load()
     places = positions(work.step_m, bench.world.chassis.width_m)
