@@ -105,6 +105,8 @@ class Work:
         for plan in self.plans.values():
             plan.check()
         record = self.folder / RECORD_NAME
+        if self.folder.exists() and not self.folder.is_dir():
+            raise PaperError(f"{self.folder} is no folder; choose another --out")
         own = {"repeats": self.repeats, "step_m": self.step_m, "settings": list(self.settings)}
         if force:
             for name in _MADE:
@@ -131,7 +133,7 @@ class Work:
             raise PaperError(f"{self.folder} can't be made: {error.strerror}; choose another --out") from error
 
 
-class Progress:
+class WorkProgress:
     """How much of the work is done and how long the rest will take, told to `say` now and then."""
 
     def __init__(self, total_s: float, say: Callable[[str], None], every_s: float = 5.0) -> None:
@@ -179,7 +181,7 @@ def carry_out_work(work: Work, picture_format: str, say: Callable[[str], None]) 
     tables = {name: sweep.Table(work.folder / name, plan) for name, plan in work.plans.items()}
     tasks = {name: sweep.remaining(plan, tables[name].rows) for name, plan in work.plans.items()}
     runs = sum(map(len, tasks.values()))
-    progress = Progress(_cost_s(work, len(left), len(bags), runs), say)
+    progress = WorkProgress(_cost_s(work, len(left), len(bags), runs), say)
     _measure_drives(work, bench, progress)
     for samples in carry_out(left, conditions, min(work.jobs, len(left))) if left else ():
         looks.add(samples)
@@ -207,7 +209,7 @@ def _cost_s(work: Work, positions_left: int, bags: int, runs: int) -> float:
     return drives + POSITION_S * positions_left + BAG_S * bags + RUN_S * runs + DRAWING_S
 
 
-def _measure_drives(work: Work, bench: Scenario, progress: Progress) -> None:
+def _measure_drives(work: Work, bench: Scenario, progress: WorkProgress) -> None:
     """Calibrate the motors and compare the encoders, where that isn't done yet."""
     rig = CalibrationRig(bench.world.make_surface(), bench.world, SEED, 0.0)
     motors, encoders = (_file(work, name) for name in ("motors", "encoders"))

@@ -41,8 +41,13 @@ class Run:
 def saved(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Figures instead of files."""
     found: list[Any] = []
+
+    def keep(figure: Any, path: str | Path) -> Path:
+        found.append(figure)
+        return Path(path)
+
     for module in (figures, error_figure, eigenvalue_figure, sweep_figure):
-        monkeypatch.setattr(module, "save_figure", lambda figure, path: found.append(figure) or Path(path))
+        monkeypatch.setattr(module, "save_figure", keep)
     return found
 
 
@@ -68,7 +73,7 @@ def test_the_trajectory_shows_places_direction_bodies_and_errors(
     places = next(line for line in above.lines if line.get_label() == "place in formation")
     assert len(places.get_xdata()) == 2 * len(STEPS)
     for line, follower in zip(below.lines, analysis.followers, strict=True):
-        assert line.get_ydata() == pytest.approx([100.0 * t.formation_error_m for t in follower.timesteps])
+        assert line.get_ydata() == pytest.approx([100.0 * (t.formation_error_m or 0.0) for t in follower.timesteps])
     assert below.get_xlim() == (0.5, 7.5)
     assert len(above.patches) == 2 * len(record.tracks)
 

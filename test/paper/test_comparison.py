@@ -8,7 +8,7 @@ from robot_formation.experiment.sweep import Row
 from robot_formation.paper.comparison import Comparison, Ours, reduction
 from robot_formation.paper.index_page import number_text, ours_text
 from robot_formation.paper.statements import FIGURES, Statement
-from robot_formation.paper.work import Progress
+from robot_formation.paper.work import WorkProgress
 
 STATED = Statement("x", "a length", 10.0, "cm", "caption", within=0.5)
 
@@ -74,7 +74,7 @@ def test_intervals_are_written_and_an_unknown_value_is_said() -> None:
 
 def test_progress_tells_share_and_time_left() -> None:
     said: list[str] = []
-    progress = Progress(10.0, said.append, every_s=0.0)
+    progress = WorkProgress(10.0, said.append, every_s=0.0)
     progress.add(2.5, "motors")
     progress.add(7.5, "runs")
     assert said[0].startswith("25 %  motors, about 0:0")
