@@ -36,7 +36,8 @@ def draw_trajectories(drawn: Drawn, path: str | Path) -> Path:
     Raises:
         AnalysisError: the file can't be written.
     """
-    figure = new_figure(13.2, 7.4)
+    figure = new_figure(13.2, 8.4)
+    figure.get_layout_engine().set(h_pad=0.1)
     panels = figure.subplots(len(TRACKS), len(PREDICTORS) + 1, sharex=True, sharey=True)
     letters = iter("abcdefgh")
     for row, (track, own) in zip(panels, zip(TRACKS, OWN_STARTS, strict=True), strict=True):

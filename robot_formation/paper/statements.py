@@ -71,7 +71,7 @@ _TRAJECTORIES = (
 )
 _CORRECTIONS = (
     Statement("reduction_two", "track two: less correction distance in total", 78, "%", _RESULTS, 5.0),
-    Statement("reduction_two_own", "the same, each method from its own start", 78, "%", _RESULTS, 5.0),
+    Statement("reduction_two_own", "track two: the same, each method from its own start", 78, "%", _RESULTS, 5.0),
     Statement("reduction_one", "track one: less correction distance (a consistent pattern)", 0, "%", _RESULTS, 5.0),
 )
 _MOTORS = (
@@ -92,9 +92,9 @@ _AREAS = (
 )
 _PAN = (
     Statement("window_px", "width of the fine-tuning window of 6 cm", 50, "px", _CAPTION, 3.0),
-    Statement("window_low", "its lower end", 110, "px", _CAPTION, 3.0),
-    Statement("window_high", "its upper end", 160, "px", _CAPTION, 3.0),
-    Statement("window_difference", "largest difference inside it over distances u, below", 7, "px", _CAPTION),
+    Statement("window_low", "lower end of the fine-tuning window", 110, "px", _CAPTION, 3.0),
+    Statement("window_high", "upper end of the fine-tuning window", 160, "px", _CAPTION, 3.0),
+    Statement("window_difference", "largest difference in the window over distances u, below", 7, "px", _CAPTION),
 )
 _SIDE = (
     Statement("tolerance_side", "tolerance of the side lengths' difference", 4, "px", "table 2"),
