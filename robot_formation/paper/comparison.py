@@ -143,7 +143,18 @@ def _corrections(results: Results) -> dict[str, Ours]:
         "nearly equal displacements are too few to learn it from (docs/explanation/predictors_compared.md)."
     )
     own = noise + " Different starts add the difference of the ground to that of the methods."
+    without, with_prediction = (
+        [t.corrections.u_m + t.corrections.v_m for t in results.drawn["one", name][1].followers[0].timesteps]
+        for name in ("previous", "measured")
+    )
+    more = [own - other for own, other in zip(with_prediction, without, strict=False)]
+    worst = Ours(
+        int(np.argmax(more)) + 1 if any(more) else None,
+        reason="Of the run that is drawn. As we read the paper, both methods do the same in the collection phase, "
+        "timesteps 1 to 3; the first forecast by K is for timestep 4.",
+    )
     return {
+        "worst_timestep": worst,
         "reduction_two": reduction(results.rows, "two", "two", "measured", noise),
         "reduction_two_own": reduction(results.rows, "two", "two_baseline", "measured", own),
         "reduction_one": reduction(results.rows, "one", "one", "measured", noise),

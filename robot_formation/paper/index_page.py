@@ -19,13 +19,14 @@ body { font-family: system-ui, sans-serif; line-height: 1.4; margin: 0 auto; max
   color: #1a1a1a; background: #fff; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; border-top: 1px solid #ccc; padding-top: 1rem; }
 img { max-width: 100%; height: auto; }
-.wide { overflow-x: auto; }
+.wide, .figure { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-size: 0.9rem; }
 th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.6rem 0.25rem 0; border-bottom: 1px solid #ddd; }
 td.number { white-space: nowrap; }
 .agrees { color: #00694b; } .differs { color: #a33f00; font-weight: 600; } .unknown { color: #555; }
 small { color: #555; }
 @media (max-width: 34rem) {
+  .figure img { max-width: none; width: 44rem; }
   .numbers thead { display: none; }
   .numbers tr { display: block; border-bottom: 1px solid #999; padding: 0.4rem 0; }
   .numbers td { display: block; border: 0; padding: 0; white-space: normal; }
@@ -81,7 +82,7 @@ def _section(number: int, figure: PaperFigure, picture: Path, compared: Sequence
     shown = f'<a href="{escape(picture.name)}">{escape(picture.name)}</a>'
     if kind is not None:
         data = base64.b64encode(picture.read_bytes()).decode("ascii")
-        shown = f'<img src="data:{kind};base64,{data}" alt="{escape(figure.title)}">'
+        shown = f'<div class="figure"><img src="data:{kind};base64,{data}" alt="{escape(figure.title)}"></div>'
     rows = "\n".join(_row(entry) for entry in compared)
     return [
         f'<h2 id="{figure.name}">{number}. {escape(figure.title)}</h2>',
@@ -112,6 +113,7 @@ def _row(entry: Comparison) -> str:
 def number_text(value: float, unit: str, sign: str = "") -> str:
     """Return a number as people read it, with its unit."""
     rounded = 0.0 if abs(value) < 5e-4 else value
+    sign = sign if rounded else ""
     digits = 0 if float(rounded).is_integer() else (1 if abs(rounded) >= 10.0 else 2)
     return f"{rounded:{sign}.{digits}f}" + (f" {unit}" if unit else "")
 

@@ -72,6 +72,7 @@ _TRAJECTORIES = (
 _CORRECTIONS = (
     Statement("reduction_two", "track two: less correction distance in total", 78, "%", _RESULTS, 5.0),
     Statement("reduction_two_own", "track two: the same, each method from its own start", 78, "%", _RESULTS, 5.0),
+    Statement("worst_timestep", "track one: timestep at which prediction errs noticeably more", 3, "", _RESULTS),
     Statement("reduction_one", "track one: less correction distance (a consistent pattern)", 0, "%", _RESULTS, 5.0),
 )
 _MOTORS = (
