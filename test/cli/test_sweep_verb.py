@@ -101,6 +101,7 @@ def test_the_folder_holds_table_plan_and_both_summaries(
     code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "a" / "b")
     assert code == 0
     assert sorted(p.name for p in (tmp_path / "a" / "b").iterdir()) == [
+        "corrections.png",
         "runs.csv",
         "summary.json",
         "summary.md",
