@@ -7,11 +7,12 @@ import argparse
 import tempfile
 from pathlib import Path
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from robot_formation.analysis.from_bag import load_run
+from robot_formation.analysis.plotting import new_figure, save_figure
+from robot_formation.analysis.style import ORANGE, SKY
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
@@ -40,11 +41,28 @@ def errors_of(track: str, seed: int, calibration: str) -> dict[str, npt.NDArray[
 
 
 def draw(file: Path) -> None:
-    """Write the first picture of track two."""
+    """Write the first picture of track two, brighter and without noise, with contour lines, a scale and names."""
     surface, parameters = make_surface("bowl"), WorldParameters()
     camera = OverheadCamera(surface, parameters, 3)
-    robots = [pose_on_surface(surface, x, y, 0.75 * np.pi) for x, y in ((1.412, 0.111), (1.638, 0.337))]
-    cv2.imwrite(str(file), camera.frame(robots, 0))
+    poses = [pose_on_surface(surface, x, y, 0.75 * np.pi) for x, y in ((1.412, 0.111), (1.638, 0.337))]
+    figure = new_figure(6.4, 6.2)
+    axes = figure.subplots()
+    axes.imshow(camera.view(poses), cmap="gray", vmin=20, vmax=170)
+    ticks = np.linspace(0.0, surface.size_m, 80)
+    x, y = np.meshgrid(ticks, ticks)
+    heights = surface.heights(x, y)
+    columns, rows = camera.project(np.stack([x, y, heights], axis=-1).reshape(-1, 3)).T.reshape(2, *x.shape)
+    lines = axes.contour(columns, rows, heights * 1e3, levels=range(60, 201, 20), colors=SKY, linewidths=0.7)
+    axes.clabel(lines, fmt="%g mm", fontsize=7)
+    ends = np.array([(1.08 + 0.5 * end, 1.70, surface.height(1.08 + 0.5 * end, 1.70)) for end in (0, 1)])
+    axes.plot(*camera.project(ends).T, color="white", linewidth=2.5)
+    axes.text(*camera.project(ends.mean(axis=0)[None])[0] + (0, -6), "50 cm", color="white", ha="center")
+    for name, colour, pose in zip(("leader", "follower 1"), (ORANGE, SKY), poses, strict=True):
+        column, row = camera.project(np.array([pose.position]))[0]
+        arrow = {"arrowstyle": "-", "color": colour}
+        axes.annotate(name, (column, row), (column - 95, row - 40), color=colour, arrowprops=arrow, ha="center")
+    axes.set(xlabel="column (px)", ylabel="row (px)", title="overhead camera, contrast raised, heights drawn in")
+    save_figure(figure, file)
 
 
 def main() -> None:

@@ -13,21 +13,22 @@ from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.forecasts import OneStepForecasts
 from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
 from robot_formation.analysis.quantiles import NORMAL_90
+from robot_formation.analysis.style import PALETTE, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, safe for colour-blind readers.
-_COLOURS = ("#0072B2", "#E69F00", "#009E73")
+_COLOURS = PALETTE[:3]
 MOST_DRAWN = len(_COLOURS)
 """Predictors that one picture has room for."""
 
-_AXES = ("u (to the right)", "v (forward)")
+_AXES = ("u, to the right", "v, forward")
 _CM = 100.0
 _MANY = 60  # timesteps from which on single marks would run into each other
 
 
+@styled
 def draw_forecasts(
     log: DisplacementLog, forecasts: Sequence[OneStepForecasts], path: str | Path, best: str | None = None
 ) -> Path:
@@ -53,7 +54,7 @@ def draw_forecasts(
             _panel(panels[row, column], log.targets_m[:, row], forecast, row, colour)
         panels[1, column].set_xlabel("timestep")
     for row, name in enumerate(_AXES):
-        panels[row, 0].set_ylabel(f"{name}, cm")
+        panels[row, 0].set_ylabel(f"{name} (cm)")
         _limit(panels[row, 0], log.targets_m[:, row], forecasts, row)
     _legend(figure, "ideal move" if log.has_residuals else "displacement")
     figure.suptitle(f"{Path(log.source).name}: one-step forecasts", fontsize=12)
@@ -74,9 +75,7 @@ def _panel(axes: Axes, target_m: NDArray[np.float64], forecast: OneStepForecasts
     )
     axes.set_xlim(0.5, len(numbers) + 0.5)
     axes.xaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], integer=True))
-    axes.grid(color="0.88", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid()
 
 
 def _band_cm(forecast: OneStepForecasts, row: int) -> NDArray[np.float64]:

@@ -102,7 +102,7 @@ def motion_totals(record: RunRecord, follower: FollowerRecord) -> JsonObject:
 def gaps_m(record: RunRecord, own: Array, others: Array) -> Array:
     """Gaps (n,) of the bodies at poses as a `Course` has them, (n, 5) each, metres."""
     length_m, width_m, top_m = (
-        record.world_number(f"chassis.{name}", default)
+        record.said("world", f"chassis.{name}", default)
         for name, default in (("length_m", LENGTH_M), ("width_m", WIDTH_M), ("body_top_m", TOP_M))
     )
 
@@ -131,7 +131,7 @@ def _course(record: RunRecord, robot: str) -> Course | None:
     track = record.tracks.get(robot)
     if track is None or not len(track.stamps_ns):
         return None
-    return Course.of(track, 1.0 / record.world_number("state_rate_hz", STATE_RATE_HZ))
+    return Course.of(track, 1.0 / record.said("world", "state_rate_hz", STATE_RATE_HZ))
 
 
 def _errors_m(record: RunRecord, follower: FollowerRecord, own: Course, neighbour: Course, stamps: Stamps) -> Array:

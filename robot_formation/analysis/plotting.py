@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 DPI = 150
 _GAP = 0.01  # between a legend and the figure's lower edge, share of the figure's height
+_TIMELESS = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 
 
 def new_figure(width: float, height: float) -> Any:
@@ -27,24 +28,25 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def legend_below(figure: Figure, handles: Sequence[object], columns: int, **style: object) -> None:
-    """Write a legend, centred, below all panels, and let the layout keep its room free.
+    """Write a legend, centred, below all panels, in rows of about equal length; the layout keeps its room free.
 
     Not by the place "outside lower center", which matplotlib has from 3.7 on only.
 
     Args:
         figure: made by `new_figure`.
         handles: what the legend lists, each with its label.
-        columns: of the legend.
+        columns: most entries in a row.
         style: further arguments of matplotlib's legend.
     """
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+    rows = -(-len(handles) // columns)
     legend = figure.legend(
         handles=handles,
         loc="lower center",
         bbox_to_anchor=(0.5, _GAP),
         borderaxespad=0.0,
-        ncols=columns,
+        ncols=-(-len(handles) // max(rows, 1)),
         frameon=False,
         **style,
     )
@@ -55,13 +57,14 @@ def legend_below(figure: Figure, handles: Sequence[object], columns: int, **styl
 
 
 def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Write a figure; an older file there is replaced.
+    """Write a figure in the format that the path's ending says; an older file there is replaced.
 
     Raises:
         AnalysisError: the file can't be written.
     """
     try:
-        figure.savefig(path, dpi=DPI)
+        # Without the time of day.
+        figure.savefig(path, dpi=DPI, metadata=_TIMELESS.get(Path(path).suffix.lower()))
     except OSError as error:
         raise AnalysisError(f"{path} can't be written: {error.strerror or error}; choose another folder") from error
     return Path(path)

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from robot_formation.analysis.conditions import conditions_text, run_facts
+from robot_formation.analysis.eigenvalue_figure import draw_eigenvalues
+from robot_formation.analysis.error_figure import draw_formation_error
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.figures import draw_corrections, draw_trajectory
 from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis, Timestep
@@ -49,16 +51,32 @@ def text_report(record: RunRecord, analysis: RunAnalysis) -> str:
     return "\n\n".join(sections)
 
 
-def write_pictures(record: RunRecord, analysis: RunAnalysis, folder: str | Path) -> list[Path]:
+def write_pictures(
+    record: RunRecord,
+    analysis: RunAnalysis,
+    folder: str | Path,
+    picture_format: str = "png",
+    *,
+    overhead: bool = False,
+) -> list[Path]:
     """Draw the run's pictures into a folder, made if it is missing; pictures of an older analysis are replaced.
+
+    Args:
+        record: the run.
+        analysis: the same run's quantities.
+        folder: where to.
+        picture_format: png, svg or pdf.
+        overhead: whether the trajectory shows what the overhead tracker saw.
 
     Raises:
         AnalysisError: the folder or a picture can't be written.
     """
     out = made_folder(folder)
     return [
-        draw_trajectory(record, analysis, out / "trajectory.png"),
-        draw_corrections(record, analysis, out / "corrections.png"),
+        draw_trajectory(record, analysis, out / f"trajectory.{picture_format}", overhead=overhead),
+        draw_corrections(record, analysis, out / f"corrections.{picture_format}"),
+        draw_formation_error(record, analysis, out / f"formation_error.{picture_format}"),
+        draw_eigenvalues(record, analysis, out / f"eigenvalues.{picture_format}"),
     ]
 
 

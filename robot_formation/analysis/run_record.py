@@ -20,6 +20,8 @@ from robot_formation.schedule.schedules import Spacing
 
 DOT_HEIGHT_M = 0.216
 """Height of the reference dot above base_link (paper: the robot's height)."""
+BODY_M = (0.365, 0.238)
+"""Length and width of a robot (paper)."""
 
 
 @dataclass(frozen=True)
@@ -164,24 +166,18 @@ class RunRecord:
     @property
     def dot_height_m(self) -> float:
         """Height of the reference dot above base_link, metres: what the run says, else the paper's robot's."""
-        return self.world_number("marker.top_m", DOT_HEIGHT_M)
+        return self.said("world", "marker.top_m", DOT_HEIGHT_M)
 
-    def world_number(self, name: str, default: float) -> float:
-        """Return a parameter of the run's world; the default where it says none, or no finite number above 0."""
-        try:
-            said = float(self._parameters["world"][name])
-        except (KeyError, ValueError, TypeError, OverflowError):
-            return default
-        return said if math.isfinite(said) and said > 0.0 else default
+    @property
+    def body_m(self) -> tuple[float, float]:
+        """Length and width of a robot, metres: what the run says, else the paper's."""
+        length, width = (f"chassis.{side}_m" for side in ("length", "width"))
+        return self.said("world", length, BODY_M[0]), self.said("world", width, BODY_M[1])
 
     @property
     def formation_distance_m(self) -> float:
         """Distance between neighbours abreast, metres: the run's fine-tuner's, else the paper's."""
-        try:
-            said = float(self._parameters["fine_tuner"]["formation_distance_m"])
-        except (KeyError, ValueError, TypeError, OverflowError):
-            return FORMATION_DISTANCE_M
-        return said if math.isfinite(said) else FORMATION_DISTANCE_M
+        return self.said("fine_tuner", "formation_distance_m", FORMATION_DISTANCE_M)
 
     def place(self, follower: str) -> Motion:
         """Return a follower's place in its neighbour's frame: what the run says, else beside it."""
@@ -199,3 +195,11 @@ class RunRecord:
         """Whether followers keep their places beside where their neighbours stood one timestep earlier."""
         fine_tuner = self._parameters.get("fine_tuner", {})
         return fine_tuner.get("spacing") == Spacing.DELAYED.value
+
+    def said(self, node: str, name: str, default: float) -> float:
+        """Return a node's parameter as the run says it; the default if it says none, or no finite number above 0."""
+        try:
+            said = float(self._parameters[node][name])
+        except (KeyError, ValueError, TypeError, OverflowError):
+            return default
+        return said if math.isfinite(said) and said > 0.0 else default

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_formation.analysis.plotting import new_figure, save_figure
+from robot_formation.analysis.style import FACE_COLOURS, styled
 from robot_formation.calibration.camera_samples import CameraSample, Kind, Overlay, kinds_of, overlay
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
@@ -16,13 +17,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _CM = 100.0
-# The paper's colours, from Okabe and Ito's palette.
-_COLOURS = {Kind.FRONT: "#57B894", Kind.TARGET: "#6BAED6", Kind.REAR: "#F3E26B"}
-_UNATTAINABLE, _NOTHING = "#E07B5A", "#F2F2F2"
-_MARKER = {"right": "#2171B5", "front": "#00795A", "rear": "#C9AE00"}
+# Each area in the colour of the face that is seen there.
+_COLOURS = {Kind.FRONT: FACE_COLOURS["front"], Kind.TARGET: FACE_COLOURS["right"], Kind.REAR: FACE_COLOURS["rear"]}
+_UNATTAINABLE, _NOTHING = "0.60", "0.95"
 _COLUMNS = 3
 
 
+@styled
 def draw_areas(
     samples: Sequence[CameraSample], body_m: tuple[float, float], edge_m: float, title: str, path: str | Path
 ) -> Path:
@@ -76,7 +77,7 @@ def _overlaid(axes: Axes, places: Iterable[Overlay], body_m: tuple[float, float]
     for place in places:
         if place.seen:
             corner = (place.u_m * _CM - 0.42 * size, place.v_m * _CM - 0.4 * size)
-            axes.annotate(str(place.seen), corner, fontsize=6.5)
+            axes.annotate(str(place.seen), corner, fontsize=8, color="white")
     _neighbour(axes, body_m, edge_m)
     axes.plot(FORMATION_DISTANCE_M * _CM, 0.0, "+", color="black", markersize=11, markeredgewidth=1.6)
     _frame(axes, places)
@@ -96,7 +97,6 @@ def _overlaid(axes: Axes, places: Iterable[Overlay], body_m: tuple[float, float]
         bbox_to_anchor=(0.5, -0.09),
         ncols=2,
         fontsize=8,
-        frameon=False,
         title=note,
         title_fontsize=8,
     )
@@ -151,17 +151,18 @@ def _rectangle(x: float, y: float, width: float, height: float, **style: Any) ->
 
 def _neighbour(axes: Axes, body_m: tuple[float, float], edge_m: float) -> None:
     length, width = body_m
-    body = _rectangle(0.0, 0.0, width * _CM, length * _CM, facecolor="0.35", edgecolor="black", zorder=3)
+    body = _rectangle(0.0, 0.0, width * _CM, length * _CM, facecolor="0.25", edgecolor="black", zorder=3)
     axes.add_patch(body)
     h = edge_m * _CM / 2.0
     axes.add_patch(_rectangle(0.0, 0.0, 2 * h, 2 * h, facecolor="white", edgecolor="none", zorder=4))
     for name, ends in (("right", ([h, h], [-h, h])), ("front", ([-h, h], [h, h])), ("rear", ([-h, h], [-h, -h]))):
-        axes.plot(*ends, color=_MARKER[name], linewidth=2.5, solid_capstyle="butt", zorder=5)
+        axes.plot(*ends, color=FACE_COLOURS[name], linewidth=2.5, solid_capstyle="butt", zorder=5)
 
 
 def _frame(axes: Axes, items: Sequence[Overlay] | Sequence[CameraSample]) -> None:
     edge = max(item.u_m for item in items) * _CM + _cell(items) / 2.0
     axes.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal")
+    axes.spines[["top", "right"]].set_visible(True)
     ticks = [tick for tick in (-40, -20, 0, 20, 40) if abs(tick) < edge]
     axes.set_xticks(ticks)
     axes.set_yticks(ticks)

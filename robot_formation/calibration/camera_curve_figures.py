@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_formation.analysis.plotting import new_figure, save_figure
+from robot_formation.analysis.style import BAND, PALETTE, styled
 from robot_formation.calibration.camera_fit import WINDOW_M, CameraFit, FaceView, difference_px
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 
@@ -16,12 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _CM = 100.0
-# Blue, orange and green as in the paper's figure, then further ones; from Okabe and Ito's palette.
-_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
-_RED, _BAND = "#C00000", "0.9"
+_COLOURS = PALETTE  # blue, orange and green as in the paper's figure, then further ones
+_RED = "#C00000"
 _SHOWN_M = 0.105
 
 
+@styled
 def draw_pan(
     fit: CameraFit,
     views: Sequence[FaceView],
@@ -62,11 +63,10 @@ def draw_pan(
     for column in (low, high):
         upper.axhline(column, color="0.45", linestyle=":", linewidth=1.2)
     for panel in (upper, lower):
-        panel.axvspan(-WINDOW_M * _CM, WINDOW_M * _CM, color=_BAND, zorder=0)
-        panel.spines[["top", "right"]].set_visible(False)
+        panel.axvspan(-WINDOW_M * _CM, WINDOW_M * _CM, color=BAND, zorder=0)
     upper.plot([], [], color="0.45", linestyle=":", label=f"fine-tuning window, {low:.0f} to {high:.0f} px")
     upper.set_ylabel("column of the Target block (px)")
-    upper.legend(frameon=False, fontsize=9)
+    upper.legend()
     _differences(lower, fit, views, compared_m, v)
     lower.set_xlabel("v, follower ahead of its neighbour (cm)")
     figure.suptitle(title, fontsize=11)
@@ -89,9 +89,10 @@ def _differences(axes: Axes, fit: CameraFit, views: Sequence[FaceView], compared
     ends = f"u = {min(compared_m) * _CM:g} to {max(compared_m) * _CM:g} cm"
     axes.set_ylabel("largest\ndifference (px)")
     axes.set_ylim(bottom=0.0)
-    axes.legend(title=ends, frameon=False, fontsize=9, title_fontsize=9, loc="upper center", ncols=2)
+    axes.legend(title=ends, title_fontsize=9, loc="upper center", ncols=2)
 
 
+@styled
 def draw_side(fit: CameraFit, views: Sequence[FaceView], tolerance_m: float, title: str, path: str | Path) -> Path:
     """Draw width, height and the longer side of the Target block against u, straight beside the neighbour.
 
@@ -122,13 +123,12 @@ def draw_side(fit: CameraFit, views: Sequence[FaceView], tolerance_m: float, tit
         panel.axvspan(
             (FORMATION_DISTANCE_M - tolerance_m) * _CM,
             (FORMATION_DISTANCE_M + tolerance_m) * _CM,
-            color=_BAND,
+            color=BAND,
             zorder=0,
         )
-        panel.spines[["top", "right"]].set_visible(False)
     upper.set_ylabel("side length as reported (px)")
     lower.set_ylabel("longer side\n- curve (px)")
     lower.set_xlabel(f"u (cm); grey: tolerance of {tolerance_m * _CM:g} cm about the formation distance")
-    upper.legend(frameon=False, fontsize=9)
+    upper.legend()
     figure.suptitle(title, fontsize=11)
     return save_figure(figure, path)

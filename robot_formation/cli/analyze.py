@@ -6,10 +6,12 @@ import argparse
 from pathlib import Path
 
 from robot_formation.cli.parser import Subparsers
+from robot_formation.cli.picture_format import add_format
 
 DESCRIPTION = """\
-Print a run's timesteps and totals and draw its pictures (trajectory.png, corrections.png). BAG is a bag's folder, a
-single .mcap file, or the .partial folder of a run that was killed. Lengths are along u (to the right) and v (forward).
+Print a run's timesteps and totals and draw its pictures: trajectory, corrections, formation_error (over time) and
+eigenvalues (of K). BAG is a bag's folder, a single .mcap file, or the .partial folder of a run that was killed. Lengths
+are along u (to the right) and v (forward).
 """
 
 
@@ -21,6 +23,10 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print JSON and nothing else; pictures are drawn only if --out is given"
     )
+    parser.add_argument(
+        "--overhead", action="store_true", help="mark in the trajectory where the overhead camera saw the robots' dots"
+    )
+    add_format(parser)
     parser.add_argument("--no-pictures", action="store_true", help="draw no pictures")
     parser.add_argument(
         "--namespace", metavar="NS", help="the formation's namespace, where the bag holds several formations"
@@ -45,7 +51,10 @@ def run(args: argparse.Namespace) -> int:
     if not args.json:
         print(text_report(record, analysis))
     drawn = not args.no_pictures and not (args.json and args.out is None)
-    pictures = write_pictures(record, analysis, args.out or pictures_folder(args.bag)) if drawn else []
+    pictures = []
+    if drawn:
+        folder = args.out or pictures_folder(args.bag)
+        pictures = write_pictures(record, analysis, folder, args.format, overhead=args.overhead)
     if args.json:
         files = {"bag": str(args.bag), "pictures": [str(picture) for picture in pictures]}
         print(to_json(analysis, {**run_facts(record.details), **files, "reason": None}))

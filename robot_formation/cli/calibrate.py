@@ -14,6 +14,7 @@ from robot_formation.cli.calibration_options import build_scenario, free_folder
 from robot_formation.cli.messages import say
 from robot_formation.cli.option_types import option_type, whole_number
 from robot_formation.cli.parser import Subparsers
+from robot_formation.cli.picture_format import add_format
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -33,8 +34,8 @@ Drive a robot over preset distances along v and u and compare what its motors' e
 reference dot say (encoders.png). --set drive.calibration_file=FILE takes the robot's own calibration curves.
 """
 CALIBRATION_FILE = "motors.yaml"
-MOTORS_PICTURE = "motors.png"
-ENCODERS_PICTURE = "encoders.png"
+MOTORS_PICTURE = "motors"
+ENCODERS_PICTURE = "encoders"
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -72,6 +73,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", metavar="DIR", type=Path, help="folder for the files (default: calibrations/SCENARIO_seedN)"
     )
+    add_format(parser)
     parser.add_argument("--force", action="store_true", help="replace files of an older calibration")
     parser.add_argument("--json", action="store_true", help="print JSON and nothing else on standard output")
 
@@ -106,12 +108,13 @@ def run_motors(args: argparse.Namespace) -> int:
     from robot_formation.drive.curves import MotorCalibration, save_calibration
 
     scenario = build_scenario(args, with_curves=False)
-    folder = free_folder(args, scenario, (CALIBRATION_FILE, MOTORS_PICTURE))
+    name = f"{MOTORS_PICTURE}.{args.format}"
+    folder = free_folder(args, scenario, (CALIBRATION_FILE, name))
     rig = make_rig(args, scenario)
     fits = calibrate_motors(rig, scenario.robots, scenario.drive, args.repeats, say)
     conditions = {**_conditions(args, scenario), **robot_facts(scenario.drive, scenario.world)}
     save_calibration(folder / CALIBRATION_FILE, MotorCalibration(curves(fits).robots, conditions))
-    picture = draw_motors(fits, f"Motor calibration · {_told(args, scenario)}", folder / MOTORS_PICTURE)
+    picture = draw_motors(fits, f"Motor calibration · {_told(args, scenario)}", folder / name)
     if args.json:
         said = {**_conditions(args, scenario), "file": str(folder / CALIBRATION_FILE), "picture": str(picture)}
         print(json.dumps({**said, "robots": motors_json(fits)}, indent=2, allow_nan=False))
@@ -139,12 +142,13 @@ def run_encoders(args: argparse.Namespace) -> int:
     scenario = build_scenario(args, with_curves=True)
     if args.robot not in scenario.robots:
         raise FormationError(f"the scenario has no robot '{args.robot}'{suggestion(args.robot, scenario.robots)}")
-    folder = free_folder(args, scenario, (ENCODERS_PICTURE,))
+    name = f"{ENCODERS_PICTURE}.{args.format}"
+    folder = free_folder(args, scenario, (name,))
     say(describe_curves(scenario.drive))
     rig = make_rig(args, scenario)
     comparisons = compare_distances(measure_encoders(rig, args.robot, scenario.drive, args.repeats, say))
     title = f"{args.robot.replace('_', ' ')}, travelled distances · {_told(args, scenario)}"
-    picture = draw_encoders(comparisons, title, folder / ENCODERS_PICTURE)
+    picture = draw_encoders(comparisons, title, folder / name)
     if args.json:
         said = {"robot": args.robot, **_conditions(args, scenario), "picture": str(picture)}
         said["calibration_file"] = scenario.drive.calibration_file or None

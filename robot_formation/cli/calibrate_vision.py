@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robot_formation import exit_codes
+from robot_formation.analysis.style import FORMATS
 from robot_formation.batch.progress_line import with_progress
 from robot_formation.cli.calibration_options import build_scenario, output_folder
 from robot_formation.cli.option_types import number, whole_number
@@ -19,7 +20,6 @@ from robot_formation.errors import FormationError
 if TYPE_CHECKING:
     from robot_formation.calibration.camera_grid import Conditions, Position
     from robot_formation.calibration.camera_report import VisionResult
-    from robot_formation.calibration.camera_samples import CameraSample
     from robot_formation.experiment.scenario import Scenario
 
 DESCRIPTION = """\
@@ -29,8 +29,6 @@ angles, and look (with two finer sets parallel to the neighbour). Blocks go into
 (vision_side.png), and the fine-tuner's values (vision.yaml). 'formation run --set fine_tuner.calibration_file=FILE'
 uses them. A calibration that was stopped goes on when the same command is given again.
 """
-CALIBRATION_FILE = "vision.yaml"
-PICTURES = {"areas": "vision_areas.png", "pan": "vision_pan.png", "side": "vision_side.png"}
 _STEP_M = 0.05
 
 
@@ -50,6 +48,7 @@ def run_vision(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments or the folder, or if the curves can't be fitted.
     """
+    from robot_formation.calibration.camera_files import CALIBRATION_FILE, evaluate, picture_paths
     from robot_formation.calibration.camera_grid import positions
     from robot_formation.calibration.camera_run import BAG_NAME, record_of
     from robot_formation.calibration.camera_table import RECORD_NAME, TABLE_NAME, VisionTable
@@ -61,11 +60,13 @@ def run_vision(args: argparse.Namespace) -> int:
     places = positions(args.step, conditions.world.chassis.width_m)
     folder = output_folder(args, scenario)
     if args.force:
-        _clear(folder, (RECORD_NAME, TABLE_NAME, CALIBRATION_FILE, *PICTURES.values(), BAG_NAME))
+        drawn = [path.name for kind in FORMATS for path in picture_paths(folder, kind).values()]
+        _clear(folder, (RECORD_NAME, TABLE_NAME, CALIBRATION_FILE, *drawn, BAG_NAME))
     table = VisionTable(folder, record_of(conditions, args.step), places)
     try:
         _look(table, places, conditions, args.jobs)
-        result = _evaluate(scenario, conditions, table.all(places), folder, args.step)
+        tolerance_m = scenario.fine_tuner.alignment.u_tolerance_m
+        result = evaluate(conditions, table.all(places), folder, args.step, tolerance_m, args.format)
     except KeyboardInterrupt:
         print(f"\nformation calibrate: interrupted; the same command goes on in {folder}", file=sys.stderr)
         return exit_codes.INTERRUPTED
@@ -87,49 +88,14 @@ def _look(table: Any, places: list[Position], conditions: Conditions, jobs: int)
         table.add(samples)
 
 
-def _evaluate(
-    scenario: Scenario, conditions: Conditions, samples: list[CameraSample], folder: Path, step_m: float
-) -> VisionResult:
-    """Write bag, pictures and calibration; the curves come last because they may not be found."""
-    from robot_formation.bag.bag_path import PARTIAL_SUFFIX
-    from robot_formation.calibration.camera_areas_figure import draw_areas
-    from robot_formation.calibration.camera_check import camera_facts
-    from robot_formation.calibration.camera_curve_figures import draw_pan, draw_side
-    from robot_formation.calibration.camera_edge_bias import edge_biases
-    from robot_formation.calibration.camera_fit import face_views, fit_camera
-    from robot_formation.calibration.camera_grid import true_faces
-    from robot_formation.calibration.camera_report import VisionResult
-    from robot_formation.calibration.camera_run import BAG_NAME, record_of, write_bag
-    from robot_formation.follower.camera_calibration_file import VisionCalibration, save_vision
-
-    bag = folder / BAG_NAME
-    if not bag.exists():
-        shutil.rmtree(bag.with_name(BAG_NAME + PARTIAL_SUFFIX), ignore_errors=True)  # of a run that was stopped
-        metadata = {"calibration": "vision", "conditions": json.dumps(record_of(conditions, step_m))}
-        write_bag(bag, samples, conditions, metadata)
-    world, told = conditions.world, _told(scenario)
-    edge = world.marker.edge_m
-    body = (world.chassis.length_m, world.chassis.width_m)
-    draw_areas(samples, body, edge, f"Blocks around the beacon neighbour · {told}", folder / PICTURES["areas"])
-    views = face_views(samples)
-    edges = edge_biases((sample, true_faces(world, sample)) for sample in samples if sample.blocks)
-    result = VisionResult(samples, views, fit_camera(views, edge), edges)
-    measured_with = {"seed": scenario.setup.seed, "surface": world.surface, "step_m": step_m, **camera_facts(world)}
-    save_vision(folder / CALIBRATION_FILE, VisionCalibration(result.fit.alignment(), measured_with))
-    distances, compared = result.distances()
-    draw_pan(result.fit, views, distances, compared, f"Pan curves · {told}", folder / PICTURES["pan"])
-    tolerance = scenario.fine_tuner.alignment.u_tolerance_m
-    draw_side(result.fit, views, tolerance, f"Side length beside the neighbour · {told}", folder / PICTURES["side"])
-    return result
-
-
 def _print(args: argparse.Namespace, scenario: Scenario, result: VisionResult, folder: Path) -> None:
+    from robot_formation.calibration.camera_files import CALIBRATION_FILE, picture_paths
     from robot_formation.calibration.camera_report import vision_json, vision_text
     from robot_formation.calibration.camera_run import BAG_NAME
     from robot_formation.calibration.camera_table import TABLE_NAME
 
     files = {"table": folder / TABLE_NAME, "bag": folder / BAG_NAME, "file": folder / CALIBRATION_FILE}
-    pictures = {name: str(folder / picture) for name, picture in PICTURES.items()}
+    pictures = {name: str(picture) for name, picture in picture_paths(folder, args.format).items()}
     if args.json:
         said = {
             "scenario": scenario.setup.name,

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robot_formation import names
+from robot_formation.analysis.style import FORMATS
 from robot_formation.cli.option_types import Names
 from robot_formation.cli.parser import Subparsers
+from robot_formation.cli.picture_format import add_format
 from robot_formation.errors import FormationError
 
 if TYPE_CHECKING:
@@ -25,7 +27,6 @@ move (displacement plus residual) if the log has residuals, else the displacemen
 u_m and v_m (metres, u to the right, v forward), and where they are known residual_u_m and residual_v_m (what was left
 to go at the end), commanded_u_m and commanded_v_m (the displacement if the robot had gone exactly as told), turn_rad.
 """
-_SUFFIXES = (".png", ".pdf", ".svg")
 _DRAWN = ("previous", "measured", "formation")
 """What the picture shows if no predictors are named."""
 _FARTHEST = 50
@@ -84,10 +85,11 @@ def add_parser(subparsers: Subparsers) -> None:
         "--figure",
         metavar="FILE",
         type=_picture,
-        help="picture of up to three predictors: .png, .pdf or .svg (default: LOG_forecasts.png beside the log, or "
+        help="picture of up to three predictors: .png, .svg or .pdf (default: LOG_forecasts.png beside the log, or "
         "forecasts.png in <BAG>_analysis)",
     )
     picture.add_argument("--no-figure", action="store_true", help="draw no picture")
+    add_format(parser, default=None)
     parser.add_argument(
         "--json", action="store_true", help="print JSON and nothing else; a picture is drawn only if --figure is given"
     )
@@ -222,6 +224,8 @@ def _without_absurd(log: DisplacementLog, parameters: PredictorParameters) -> Di
 def _draw(args: argparse.Namespace, log: DisplacementLog, forecasts: Sequence[OneStepForecasts]) -> Path | None:
     """Draw the picture, if one is wanted; return its path."""
     path: Path | None = args.figure
+    if path is not None and args.format is not None and path.suffix.lower() != f".{args.format}":
+        raise FormationError(f"--figure {path} is no {args.format}; leave --format out, its name's ending says it")
     if path is None:
         if args.no_figure or args.json:
             return None
@@ -239,12 +243,13 @@ def _draw(args: argparse.Namespace, log: DisplacementLog, forecasts: Sequence[On
 
 
 def _default_picture(args: argparse.Namespace) -> Path:
+    kind = args.format or FORMATS[0]
     if args.bag is None:
         log: Path = args.log
-        return log.with_name(f"{log.stem}_forecasts.png")
+        return log.with_name(f"{log.stem}_forecasts.{kind}")
     from robot_formation.analysis.report import made_folder, pictures_folder
 
-    return made_folder(pictures_folder(args.bag)) / "forecasts.png"
+    return made_folder(pictures_folder(args.bag)) / f"forecasts.{kind}"
 
 
 def _warn_of_bounds(log: DisplacementLog, parameters: PredictorParameters) -> None:
@@ -270,6 +275,7 @@ def _horizon(text: str) -> int:
 def _picture(text: str) -> Path:
     """An argparse type for a file of a picture."""
     path = Path(text)
-    if path.suffix.lower() not in _SUFFIXES:
-        raise argparse.ArgumentTypeError(f"{text!r} is no picture: end its name with {', '.join(_SUFFIXES)}")
+    if path.suffix.lower().removeprefix(".") not in FORMATS:
+        endings = ", ".join(f".{kind}" for kind in FORMATS)
+        raise argparse.ArgumentTypeError(f"{text!r} is no picture: end its name with {endings}")
     return path

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from robot_formation import exit_codes
 from robot_formation.cli.option_types import number, port, whole_number
 from robot_formation.cli.parser import Subparsers
+from robot_formation.cli.picture_format import add_format
 from robot_formation.errors import FormationError
 from robot_formation.json_values import JsonObject
 
@@ -68,6 +69,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument("--view", action="store_true", help="show the run in 3-D in a browser of this machine")
     parser.add_argument("--view-port", metavar="N", type=port, help="port of --view (default: 8080; 0: any free one)")
     parser.add_argument("--in-process", action="store_true", help="the same run in one process, without ROS middleware")
+    add_format(parser)
     parser.add_argument(
         "--json", action="store_true", help="print JSON and nothing else on standard output; no pictures"
     )
@@ -221,7 +223,7 @@ def report(args: argparse.Namespace, result: RunResult) -> None:
         print(f"\nbag: {result.bag}\n'formation analyze {result.bag}' makes the pictures")
         return
     folder = result.bag.with_name(f"{result.bag.name}_analysis")
-    pictures = write_pictures(record, analysis, folder)
+    pictures = write_pictures(record, analysis, folder, args.format)
     print(f"\nbag: {result.bag}\npictures: " + ", ".join(str(picture) for picture in pictures))
 
 

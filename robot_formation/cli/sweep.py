@@ -16,6 +16,7 @@ from robot_formation import exit_codes
 from robot_formation.batch.progress_line import with_progress
 from robot_formation.cli.option_types import Names, whole_number
 from robot_formation.cli.parser import Subparsers
+from robot_formation.cli.picture_format import add_format
 from robot_formation.errors import FormationError
 from robot_formation.json_values import JsonObject
 
@@ -32,6 +33,7 @@ controller, commanded the ideal move.
 """
 SUMMARY_NAME = "summary.json"
 TABLE_NAME = "summary.md"
+PICTURE_NAME = "corrections"
 FEW_SEEDS = 5
 """Of n seeds, the whole range of values covers the median with a probability of 1 - 2**(1 - n): 94 % for five."""
 MOST_SEEDS = 1_000_000
@@ -63,6 +65,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="any parameter, for all runs; may be repeated"
     )
+    add_format(parser)
     parser.add_argument("--json", action="store_true", help="print the summary as JSON and nothing else")
     parser.set_defaults(run=run)
 
@@ -88,6 +91,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
+    from robot_formation.analysis.sweep_figure import draw_sweep
     from robot_formation.analysis.sweep_summary import summarise, table
     from robot_formation.experiment import sweep
 
@@ -109,21 +113,20 @@ def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
         except KeyboardInterrupt:
             print(f"\nformation sweep: interrupted; the same command with --out {folder} goes on", file=sys.stderr)
             return exit_codes.INTERRUPTED
-    summary = summarise(sweep.chosen(plan, results.rows))
+    rows_now = sweep.chosen(plan, results.rows)
+    summary = summarise(rows_now)
     said = {"summary": summary, **_facts(plan)}
     shown = f"{table(summary)}\n\n{_conditions_text(plan)}"
     (folder / SUMMARY_NAME).write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
     (folder / TABLE_NAME).write_text(shown + "\n", encoding="utf-8")
+    picture = draw_sweep(rows_now, folder / f"{PICTURE_NAME}.{args.format}")
     if args.json:
-        files: JsonObject = {
-            "bag": None,
-            "pictures": [],
-            "reason": None,
-        }  # no run is recorded or drawn; all came to an end
+        # No run is recorded; all came to an end.
+        files: JsonObject = {"bag": None, "pictures": [str(picture)], "reason": None}
         print(json.dumps({"runs": str(folder / sweep.RUNS_NAME), **said, **files}, indent=2))
     else:
         print(shown)
-        print(f"\nruns: {folder / sweep.RUNS_NAME}\nsummary: {folder / SUMMARY_NAME}")
+        print(f"\nruns: {folder / sweep.RUNS_NAME}\nsummary: {folder / SUMMARY_NAME}\npicture: {picture}")
     return exit_codes.DONE
 
 

@@ -11,6 +11,7 @@ from robot_formation.cli import (
     doctor,
     info,
     list_,
+    paper,
     path,
     play,
     predict,
@@ -26,6 +27,7 @@ from robot_formation.cli import (
 )
 
 VERBS = (
-    *(run, sweep, list_, analyze, compare, report, view, animate, path, predict, record, play, info, recover, replay),
+    *(run, sweep, paper, list_, analyze, compare, report, view, animate),
+    *(path, predict, record, play, info, recover, replay),
     *(calibrate, teach, detect, doctor, test),
 )

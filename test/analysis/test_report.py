@@ -18,6 +18,7 @@ from robot_formation.cli import analyze
 from robot_formation.errors import FormationError
 from synthetic_bag import STEPS, write_run
 
+PICTURES = ["corrections.png", "eigenvalues.png", "formation_error.png", "trajectory.png"]
 DETAILS = {"scenario": "track two", "predictor": "measured", "surface": "bowl", "seed": "3", "timesteps": "5"}
 
 
@@ -82,7 +83,7 @@ def test_the_verb_prints_the_table_and_draws_pictures_beside_the_bag(
     assert said.err == ""
     folder = bag.with_name("run_analysis")
     assert f"pictures: {folder / 'trajectory.png'}, {folder / 'corrections.png'}" in said.out
-    for name in ("trajectory.png", "corrections.png"):
+    for name in PICTURES:
         picture = matplotlib.image.imread(folder / name)
         assert picture.shape[0] > 400
         assert picture.shape[1] > 800
@@ -105,7 +106,7 @@ def test_json_is_alone_on_standard_output_and_draws_only_when_told_where(
     assert not bag.with_name("run_analysis").exists()
     assert run_verb(bag, "--json", "--out", tmp_path / "pictures") == 0
     assert json.loads(capsys.readouterr().out)["outcome"] == "done"
-    assert len(list((tmp_path / "pictures").iterdir())) == 2
+    assert sorted(p.name for p in (tmp_path / "pictures").iterdir()) == PICTURES
 
 
 def test_a_lost_run_is_a_successful_analysis(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

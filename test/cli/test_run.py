@@ -163,7 +163,12 @@ def test_without_json_the_table_and_the_pictures_are_there(tmp_path: Path) -> No
     completed = formation("run", "--bag", bag, "--set", "leader.timesteps=4", *FAST)
     assert completed.returncode == 0, completed.stderr
     assert "outcome: done" in completed.stdout
-    assert {path.name for path in (tmp_path / "bag_analysis").iterdir()} == {"trajectory.png", "corrections.png"}
+    assert {path.name for path in (tmp_path / "bag_analysis").iterdir()} == {
+        "trajectory.png",
+        "corrections.png",
+        "formation_error.png",
+        "eigenvalues.png",
+    }
 
 
 def test_list_names_what_run_takes(capsys: pytest.CaptureFixture[str]) -> None:

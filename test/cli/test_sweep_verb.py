@@ -82,7 +82,9 @@ def test_json_is_all_of_standard_output_and_progress_goes_to_standard_error(
         "drive_mode": "pwm_stop",
         "in_process": True,
     }
-    assert (found["bag"], found["pictures"], found["reason"]) == (None, [], None)
+    assert (found["bag"], found["reason"]) == (None, None)
+    assert [Path(picture).name for picture in found["pictures"]] == ["corrections.png"]
+    assert Path(found["pictures"][0]).stat().st_size > 5_000
     assert found["runs"] == str(tmp_path / "out" / "runs.csv")
     assert [(entry["predictor"], entry["runs"]) for entry in found["summary"]] == [("previous", 3), ("formation", 3)]
     assert found["summary"][1]["reduction"]["median"] == pytest.approx(1.0 - 0.101 / 0.3)
@@ -99,6 +101,7 @@ def test_the_folder_holds_table_plan_and_both_summaries(
     code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "a" / "b")
     assert code == 0
     assert sorted(p.name for p in (tmp_path / "a" / "b").iterdir()) == [
+        "corrections.png",
         "runs.csv",
         "summary.json",
         "summary.md",

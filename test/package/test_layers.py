@@ -31,7 +31,7 @@ LAYERS = [
     *((room,) for room in ("drive", "leader", "alignment", "follower", "analysis")),
     *((room,) for room in ("conversions", "components")),
     ("testing",),
-    *((room,) for room in ("viewing", "calibration", "experiment", "reporting", "nodes", "launching", "cli")),
+    *((room,) for room in ("viewing", "calibration", "experiment", "reporting", "nodes", "launching", "paper", "cli")),
 ]
 LEVEL = {area: level for level, areas in enumerate(LAYERS) for area in areas}
 ROS = re.compile(

@@ -1,0 +1,1 @@
+"""The paper's figures from runs and calibrations of this project, beside what the paper states."""
