@@ -23,8 +23,11 @@ from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 from robot_formation.schedule.start_rule import StartRule
 from robot_formation.vision.pixy2.block import Block
 
-_STILL_FRAMES, _STILL_PX = 10, 2
-"""A robot stands still if its blocks have stayed within so many pixels for so many frames (at 5 cm/s: 7 px)."""
+_STILL_FRAMES, _STILL_PX = 20, 2
+"""A robot stands still if its blocks have stayed within so many pixels for so many frames (at 5 cm/s: 14 px).
+
+Ten frames are too few: so long a neighbour may stand between the legs of a move along v and u.
+"""
 _MORE_EXTENSIONS = 12
 """Extensions of a look at a robot that moves: up to four seconds at 30 frames per second."""
 _UNTOLD = (0.01**2, 0.0, 0.0, 0.0, 0.01**2, 0.0, 0.0, 0.0, 0.02**2)

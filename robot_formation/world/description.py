@@ -71,7 +71,7 @@ def _add_base(robot: Element, parameters: WorldParameters) -> None:
     if marker.backdrop_m > 0.0:
         board = (marker.backdrop_m, BACKDROP_THICKNESS_M, marker.top_m - chassis.body_top_m)
         place = (0.0, 0.5 * (marker.edge_m + BACKDROP_THICKNESS_M), 0.5 * (marker.top_m + chassis.body_top_m))
-        _box(link, "visual", board, place, marker.body_rgb)
+        _box(link, "visual", board, place, marker.backdrop_rgb)
 
 
 def _add_wheel(

@@ -236,12 +236,14 @@ class MarkerParameters:
     tag_dark_rgb: tuple[int, ...] = parameter((12, 12, 13), "tags: dark modules", low=0, high=255)
     backdrop_m: float = parameter(
         0.0,
-        "width of a dark board at the cube's left face, which hides the markers of robots farther left; 0: none. "
+        "width of a board at the cube's left face, which hides the markers of robots farther left; 0: none. "
         "A scenario with two followers and more sets 0.16",
         unit="m",
         low=0.0,
         high=0.5,
     )
+    # In the room's light about as light as the wall: a face's edges are seen elsewhere before a dark ground.
+    backdrop_rgb: tuple[int, ...] = parameter((220, 220, 220), "that board", low=0, high=255)
     body_rgb: tuple[int, ...] = parameter((12, 12, 13), "robot body and the cube's other faces", low=0, high=255)
     dot_rgb: tuple[int, ...] = parameter((230, 230, 230), "reference dot", low=0, high=255)
     dot_radius_m: float = parameter(0.015, "radius of the reference dot", unit="m", low=0.001, high=0.2)

@@ -74,7 +74,9 @@ class Scene:
             self._add_box((PEDESTAL_M, PEDESTAL_M, foot - chassis.body_top_m), chassis.body_top_m, (grey,) * 5)
         if marker.backdrop_m > 0.0:
             board = (marker.backdrop_m, BACKDROP_THICKNESS_M, marker.top_m - chassis.body_top_m)
-            self._add_box(board, chassis.body_top_m, (grey,) * 5, y_m=0.5 * (marker.edge_m + BACKDROP_THICKNESS_M))
+            self._add_box(
+                board, chassis.body_top_m, (marker.backdrop_rgb,) * 5, y_m=0.5 * (marker.edge_m + BACKDROP_THICKNESS_M)
+            )
         target, front, rear = marker.face_colours
         self._add_box((marker.edge_m,) * 3, foot, (front, rear, grey, target, grey))
         if marker.kind is MarkerKind.TAGS:
