@@ -65,7 +65,7 @@ def test_the_trajectory_shows_places_direction_bodies_and_errors(
     record, analysis = run
     draw_trajectory(record, analysis, "x.png")
     above, below = saved[0].axes
-    assert saved[0].get_suptitle() == "track two · ripple · measured predictor · seed 3 · incomplete"
+    assert saved[0]._suptitle.get_text() == "track two · ripple · measured predictor · seed 3 · incomplete"
     assert (above.get_xlabel(), above.get_ylabel(), above.get_aspect()) == ("x (cm)", "y (cm)", 1.0)
     assert (below.get_xlabel(), below.get_ylabel()) == ("timestep", "formation\nerror (cm)")
     labels = above.get_legend_handles_labels()[1]
