@@ -28,6 +28,7 @@ from robot_formation.names import Message
 from robot_formation.parameters import suggestion
 
 _TRIANGLE_LIST = 11
+_FARTHEST_M = 1e6
 _LOGGED = (names.DISPLACEMENT, names.RESIDUAL, names.COMMANDED)
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
 
@@ -343,13 +344,19 @@ def _dots(places_m: NDArray[np.float64], turns: NDArray[np.float64], height_m: f
 
 
 def read_ground(marker: Message) -> Ground | None:
-    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices; None for others."""
+    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices.
+
+    None for others, and for one whose corners aren't numbers of a ground's size.
+    """
     if marker.type != _TRIANGLE_LIST or len(marker.points) < 3:
         return None
     corners = np.array([(point.x, point.y, point.z) for point in marker.points])
     scale = np.array([marker.scale.x, marker.scale.y, marker.scale.z])
     origin = marker.pose.position
-    corners = corners * scale + (origin.x, origin.y, origin.z)
+    with np.errstate(over="ignore", invalid="ignore"):  # any numbers
+        corners = corners * scale + (origin.x, origin.y, origin.z)
+    if not (np.abs(corners) < _FARTHEST_M).all():
+        return None
     vertices, numbers = np.unique(corners.round(6), axis=0, return_inverse=True)
     count = len(corners) // 3
     return Ground(vertices, numbers.reshape(-1)[: 3 * count].reshape(count, 3))
