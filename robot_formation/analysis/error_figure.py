@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.analysis.figures import rmse_text, robot_colour, run_title
+from robot_formation.analysis.in_motion import place_errors_m
 from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
 from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Track
 from robot_formation.analysis.style import BAND, BLACK, styled
+from robot_formation.geometry.se2 import Motion
 from robot_formation.names import beacon_neighbour
 
 if TYPE_CHECKING:
@@ -55,13 +57,13 @@ def draw_formation_error(record: RunRecord, analysis: RunAnalysis, path: str | P
     return save_figure(figure, path)
 
 
-def errors_over_time(own: Track, neighbour: Track, distance_m: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def errors_over_time(own: Track, neighbour: Track, place: Motion) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the formation error at every time at which one of the two robots has told its pose.
 
     Args:
         own: the follower's track.
         neighbour: its beacon neighbour's.
-        distance_m: between them in formation.
+        place: the follower's in the neighbour's frame.
 
     Returns:
         Simulated times (n,) in ns, and errors (n,) in metres.
@@ -70,16 +72,14 @@ def errors_over_time(own: Track, neighbour: Track, distance_m: float) -> tuple[N
     numbers = [np.searchsorted(track.stamps_ns, stamps, side="right") - 1 for track in (own, neighbour)]
     known = (numbers[0] >= 0) & (numbers[1] >= 0)
     follower, beside = (number[known] for number in numbers)
-    x, y = (own.positions_m[follower, :2] - neighbour.positions_m[beside, :2]).T
-    cosine, sine = np.cos(neighbour.yaws_rad[beside]), np.sin(neighbour.yaws_rad[beside])
-    u, v = sine * x - cosine * y, cosine * x + sine * y
-    return stamps[known], np.hypot(u - distance_m, v)
+    poses = np.column_stack([neighbour.positions_m[beside, :2], neighbour.yaws_rad[beside]])
+    return stamps[known], place_errors_m(own.positions_m[follower, :2], poses, place)
 
 
 def _panel(axes: Axes, record: RunRecord, follower: FollowerRecord, found: FollowerAnalysis) -> None:
     own, beside = (record.tracks.get(robot) for robot in (follower.name, beacon_neighbour(follower.name)))
     if own is not None and beside is not None and not record.delayed:
-        stamps, errors = errors_over_time(own, beside, record.formation_distance_m)
+        stamps, errors = errors_over_time(own, beside, record.place(follower.name))
         colour = robot_colour(follower.name)
         axes.plot(stamps * _S, errors * _CM, color=colour, linewidth=0.9, alpha=0.8, label="while robots move")
     starts_ns = [0, *(end.stamp_ns for end in follower.displacements)]

@@ -323,7 +323,7 @@ def _places_of(record: RunRecord, follower: FollowerRecord) -> Iterator[Motion]:
             pose_at_end(record, neighbour, t - 1) if record.delayed else pose(record, neighbour, displacement.stamp_ns)
         )
         if beside is not None:
-            yield beside.then(Motion.from_uv(record.formation_distance_m, 0.0))
+            yield beside.then(record.place(follower.name))
 
 
 def _mark(axes: Axes, points_m: Sequence[Any] | NDArray[np.float64], **style: Any) -> None:

@@ -271,7 +271,8 @@ def _track(messages: Sequence[Message]) -> Track | None:
     if isinstance(messages, Odometry):
         order = np.argsort(messages.stamps_ns, kind="stable")
         yaws = np.array([yaw_rad(turn) for turn in messages.orientations.tolist()])
-        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order])
+        leans = _ups(messages.orientations)[:, :2]
+        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order], leans[order])
     poses = [message.pose.pose for message in messages]
     stamps = np.array([_stamp_ns(message) for message in messages], dtype=np.int64)
     positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
@@ -336,10 +337,15 @@ def _up(q: Message) -> tuple[float, float, float]:
     return 2.0 * (q.x * q.z + q.y * q.w), 2.0 * (q.y * q.z - q.x * q.w), 1.0 - 2.0 * (q.x * q.x + q.y * q.y)
 
 
+def _ups(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the directions (n, 3) of the z axes of bodies of orientations (n, 4): see `_up`."""
+    x, y, z, w = turns.T
+    return np.column_stack([2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)])
+
+
 def _dots(places_m: NDArray[np.float64], turns: NDArray[np.float64], height_m: float) -> NDArray[np.float64]:
     """Return the places (n, 3) of a robot's dot at poses (n, 3) and (n, 4): see `_dot`."""
-    x, y, z, w = turns.T
-    up = np.column_stack([2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)])
+    up = _ups(turns)
     return places_m + height_m * up
 
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from robot_formation.analysis.chain import end_ns
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Track
 from robot_formation.geometry.footprint import footprint_gaps_m
+from robot_formation.geometry.se2 import Motion
 from robot_formation.json_values import JsonObject
 from robot_formation.names import beacon_neighbour
 
@@ -143,10 +144,21 @@ def _errors_m(record: RunRecord, follower: FollowerRecord, own: Course, neighbou
     if len(known) < len(starts) or last is None or not follower.displacements:
         return np.empty(0)
     stamps = stamps[(stamps >= max(known)) & (stamps <= last)]
-    place = _delayed_ns(record, follower, own, neighbour, stamps) if record.delayed else stamps
-    actual, beside = own.at(stamps), neighbour.at(place)
-    right = record.formation_distance_m * np.column_stack([np.sin(beside[:, 2]), -np.cos(beside[:, 2])])
-    return np.asarray(np.linalg.norm(actual[:, :2] - beside[:, :2] - right, axis=1))
+    meant = _delayed_ns(record, follower, own, neighbour, stamps) if record.delayed else stamps
+    return place_errors_m(own.at(stamps)[:, :2], neighbour.at(meant)[:, :3], record.place(follower.name))
+
+
+def place_errors_m(own: Array, neighbour: Array, place: Motion) -> Array:
+    """Return how far (n,) places (n, 2) are from those meant, metres.
+
+    Args:
+        own: the follower's places, world x and y.
+        neighbour: its beacon neighbour's poses (n, 3) then: world x, y and yaw.
+        place: its place in that robot's frame.
+    """
+    cosine, sine = np.cos(neighbour[:, 2]), np.sin(neighbour[:, 2])
+    away = np.column_stack([cosine * place.x_m - sine * place.y_m, sine * place.x_m + cosine * place.y_m])
+    return np.asarray(np.linalg.norm(own - neighbour[:, :2] - away, axis=1))
 
 
 def _delayed_ns(record: RunRecord, follower: FollowerRecord, own: Course, neighbour: Course, stamps: Stamps) -> Stamps:

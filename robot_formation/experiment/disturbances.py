@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from robot_formation.errors import shown
@@ -50,8 +51,13 @@ def pushes_of(rows: Sequence[Row]) -> tuple[Push, ...]:
     return tuple(_push(row) for row in rows)
 
 
+def _finite(number: object) -> bool:
+    return isinstance(number, (int, float)) and math.isfinite(number)
+
+
 def _push(row: Row) -> Push:
-    if len(row) != 4 or not isinstance(row[0], str):
+    named = len(row) == 4 and isinstance(row[0], str) and isinstance(row[1], int)
+    if not named or not all(map(_finite, row[2:])):
         raise ParameterError(
             f"'pushes': {shown(list(row))} is no push; write [robot, timestep, metres ahead, metres to the left], "
             "like [follower_2, 8, 0.03, 0.0]"

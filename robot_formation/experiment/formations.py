@@ -33,7 +33,10 @@ def slots_of(formation: str, pairs: Sequence[tuple[float, float]], followers: in
     if not pairs:
         return (slot(distance_m, ECHELON_AHEAD_M if formation == ECHELON else 0.0),) * followers
     if formation != ABREAST:
-        raise ParameterError(f"'formation' is {formation}, but 'slots' say the places too; keep one of them")
+        raise ParameterError(
+            f"'formation' is {formation}, but 'slots' say the places too; keep one of them "
+            f"(--set formation={ABREAST}, or --set 'slots=[]')"
+        )
     if len(pairs) not in (1, followers):
         raise ParameterError(
             f"'slots' must have a pair for each follower, {followers} in all, or one for all, not {len(pairs)}"

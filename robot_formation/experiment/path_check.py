@@ -99,10 +99,11 @@ class PathCheck:
             box = whole.boxes(pose, [number])
             if self._off(box)[0]:
                 size_m = _up(float(box.max()))
+                fewer = "fewer followers, " if len(self.slots) > 1 else ""
                 larger = f" or a plate of {size_m:.2f} m (world.surface_parameters=[size_m={size_m:.2f}])"
                 raise ParameterError(
                     f"{robot} would stand with a part of its body beyond the plate of {self._plate_m:g} x "
-                    f"{self._plate_m:g} m; take fewer followers, another {self._start_on_plate(start, whole)}"
+                    f"{self._plate_m:g} m; take {fewer}another {self._start_on_plate(start, whole)}"
                     f"{larger if size_m > self._plate_m and box.min() >= 0.0 else ''}"
                 )
 

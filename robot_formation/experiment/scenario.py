@@ -407,7 +407,9 @@ def load(path: Path) -> Scenario:
         ScenarioError: if it can't be read or isn't a mapping.
         ParameterError: on unknown or wrong entries.
     """
-    path = path if path.exists() else presets().get(str(path), path)
+    path = path if path.is_file() else presets().get(str(path), path)
+    if not path.exists() and not path.suffix:
+        raise ScenarioError(f"no scenario file or preset '{path}'{suggestion(str(path), presets())}")
     content = read_scenario_yaml(path)
     if not isinstance(content, Mapping):
         raise ScenarioError(

@@ -17,6 +17,7 @@ from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamp
 from robot_formation.analysis.style import FORMATS
 from robot_formation.analysis.sweep_figure import draw_sweep
 from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.slots import slot
 from synthetic_bag import STEPS, write_run
 
 DETAILS = {"scenario": "track two", "predictor": "measured", "surface": "ripple", "seed": "3", "timesteps": "7"}
@@ -111,11 +112,11 @@ def test_corrections_of_all_followers_have_one_scale_and_zero_is_marked(
 def test_errors_over_time_follow_the_definition() -> None:
     neighbour = Track(np.array([0, 20]), np.array([[0.0, 0.0, 0.0], [0.05, 0.0, 0.0]]), np.array([0.0, 0.0]))
     own = Track(np.array([10, 30]), np.array([[0.0, -0.32, 0.0], [0.05, -0.30, 0.0]]), np.array([0.0, 0.1]))
-    stamps, errors = errors_over_time(own, neighbour, 0.32)
+    stamps, errors = errors_over_time(own, neighbour, slot(0.32))
     assert stamps.tolist() == [10, 20, 30]
     assert errors == pytest.approx([0.0, 0.05, 0.02])
     turned = replace(neighbour, yaws_rad=np.array([0.0, np.pi / 2]))  # its right is along +x now
-    assert errors_over_time(own, turned, 0.32)[1][1] == pytest.approx(np.hypot(-0.05 - 0.32, -0.32))
+    assert errors_over_time(own, turned, slot(0.32))[1][1] == pytest.approx(np.hypot(-0.05 - 0.32, -0.32))
 
 
 def test_the_formation_error_has_time_on_its_axis_and_ends_of_timesteps(
