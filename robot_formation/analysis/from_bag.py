@@ -271,15 +271,15 @@ def _track(messages: Sequence[Message]) -> Track | None:
     if isinstance(messages, Odometry):
         order = np.argsort(messages.stamps_ns, kind="stable")
         yaws = np.array([yaw_rad(turn) for turn in messages.orientations.tolist()])
-        leans = _ups(messages.orientations)[:, :2]
-        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order], leans[order])
+        tilts = _ups(messages.orientations)[:, :2]
+        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order], tilts[order])
     poses = [message.pose.pose for message in messages]
     stamps = np.array([_stamp_ns(message) for message in messages], dtype=np.int64)
     positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
     yaws = np.array([_yaw(pose.orientation) for pose in poses])
-    leans = np.array([_up(pose.orientation)[:2] for pose in poses])
+    tilts = np.array([_up(pose.orientation)[:2] for pose in poses])
     order = np.argsort(stamps, kind="stable")
-    return Track(stamps[order], positions[order], yaws[order], leans[order])
+    return Track(stamps[order], positions[order], yaws[order], tilts[order])
 
 
 def _overhead(
