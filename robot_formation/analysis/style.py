@@ -40,8 +40,7 @@ STYLE: Any = {
     "axes.axisbelow": True,
     "grid.color": "0.88",
     "grid.linewidth": 0.6,
-    "svg.fonttype": "path",  # looks the same where the font is missing
-    "svg.hashsalt": "robot_formation",  # else the names in it are random
+    "text.parse_math": False,  # no formulas: a "$" in a name is a dollar
     "pdf.fonttype": 42,
 }
 
