@@ -153,7 +153,7 @@ def test_touches_are_counted_once_until_the_bodies_are_apart_again(gaps: list[fl
 
 
 def test_a_bag_and_a_run_in_memory_have_the_same_totals(tmp_path: Path) -> None:
-    """Leaning bodies, places of an echelon and all else: whatever way the messages have come."""
+    """Tilted bodies, places of an echelon and all else: whatever way the messages have come."""
     settings = ["formation=echelon", "start_y_m=0.3", "leader.timesteps=3", "world.camera.mode=on_demand"]
     scenario = override(load_track("one"), settings)
     in_memory = analyse(run_in_memory(scenario)).followers[0].totals
