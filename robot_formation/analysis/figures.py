@@ -157,11 +157,17 @@ def correction_bars(axes: Axes, follower: FollowerAnalysis) -> None:
     axes.grid(axis="y")
 
 
-def timestep_axis(axes: Axes, last: int) -> None:
-    """Make the x axis one of timesteps from 1 to the last, with the collection phase in grey."""
+def timestep_axis(axes: Axes, last: int, label: str = "collection phase") -> None:
+    """Make the x axis one of timesteps from 1 to the last, with the collection phase in grey.
+
+    Args:
+        axes: whose axis it is.
+        last: timestep.
+        label: of the grey in a legend; '': none.
+    """
     from matplotlib.ticker import MaxNLocator
 
-    axes.axvspan(0.5, COLLECTION_TIMESTEPS + 0.5, color=BAND, zorder=0, linewidth=0, label="collection phase")
+    axes.axvspan(0.5, COLLECTION_TIMESTEPS + 0.5, color=BAND, zorder=0, linewidth=0, label=label)
     axes.set_xlim(0.5, last + 0.5)
     if last <= 25:
         axes.set_xticks(range(1, last + 1))

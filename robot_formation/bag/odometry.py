@@ -44,7 +44,7 @@ class Odometry(Sequence[Message]):
             columns = np.array(stamps, dtype=np.int64), np.hstack([np.array(places), np.array(turns)])
         stamps_of, poses_of = columns
         kept = are_poses(poses_of[:, :3], poses_of[:, 3:])
-        self._cdr = [cdr[index] for index in np.flatnonzero(kept)]
+        self._cdr = [cdr[index] for index in np.flatnonzero(kept).tolist()]
         self.stamps_ns = stamps_of[kept]
         self.positions_m, self.orientations = poses_of[kept, :3], poses_of[kept, 3:]
 
