@@ -21,15 +21,14 @@ from robot_formation.analysis.run_record import FollowerRecord, Ground, RunRecor
 from robot_formation.analysis.style import (
     BAND,
     BLACK,
-    FOLLOWER_COLOURS,
-    LEADER_COLOUR,
     LOST_COLOUR,
     U_COLOUR,
     V_COLOUR,
+    robot_colour,
     styled,
 )
 from robot_formation.geometry.se2 import Motion
-from robot_formation.names import LEADER, beacon_neighbour
+from robot_formation.names import beacon_neighbour
 from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 
 if TYPE_CHECKING:
@@ -179,13 +178,6 @@ def planned_timesteps(record: RunRecord, analysis: RunAnalysis) -> int:
     """Return how many timesteps a figure of the run has room for: those planned, or that there were."""
     begun = [len(f.timesteps) + (f.unfinished is not None) for f in analysis.followers]
     return max(record.timesteps_planned or 0, *begun, COLLECTION_TIMESTEPS + 1)
-
-
-def robot_colour(robot: str) -> str:
-    """Return a robot's colour: the leader's, or that of follower n."""
-    if robot == LEADER:
-        return LEADER_COLOUR
-    return FOLLOWER_COLOURS[(int(robot.rpartition("_")[2]) - 1) % len(FOLLOWER_COLOURS)]
 
 
 def run_title(record: RunRecord, analysis: RunAnalysis) -> str:
