@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.colors import to_rgba
 
+from robot_formation.analysis.style import robot_colour
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import load_track, with_value
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
@@ -23,7 +24,6 @@ from robot_formation.launching.processes import run_metadata
 from robot_formation.names import LEADER, follower
 from robot_formation.surface.bowl import Bowl
 from robot_formation.viewing.animate import animate
-from robot_formation.viewing.plan_panel import robot_colour
 from robot_formation.world.bullet import pybullet
 from robot_formation.world.description import robot_description
 from robot_formation.world.parameters import WorldParameters

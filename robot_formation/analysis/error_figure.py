@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.analysis.figures import rmse_text, robot_colour, run_title
+from robot_formation.analysis.figures import rmse_text, run_title
 from robot_formation.analysis.in_motion import place_errors_m
 from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
 from robot_formation.analysis.quantities import FollowerAnalysis, RunAnalysis
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Track
-from robot_formation.analysis.style import BAND, BLACK, styled
+from robot_formation.analysis.style import BAND, BLACK, robot_colour, styled
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import beacon_neighbour
 

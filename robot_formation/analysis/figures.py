@@ -21,15 +21,14 @@ from robot_formation.analysis.run_record import FollowerRecord, Ground, RunRecor
 from robot_formation.analysis.style import (
     BAND,
     BLACK,
-    FOLLOWER_COLOURS,
-    LEADER_COLOUR,
     LOST_COLOUR,
     U_COLOUR,
     V_COLOUR,
+    robot_colour,
     styled,
 )
 from robot_formation.geometry.se2 import Motion
-from robot_formation.names import LEADER, beacon_neighbour
+from robot_formation.names import beacon_neighbour
 from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 
 if TYPE_CHECKING:
@@ -157,11 +156,17 @@ def correction_bars(axes: Axes, follower: FollowerAnalysis) -> None:
     axes.grid(axis="y")
 
 
-def timestep_axis(axes: Axes, last: int) -> None:
-    """Make the x axis one of timesteps from 1 to the last, with the collection phase in grey."""
+def timestep_axis(axes: Axes, last: int, label: str = "collection phase") -> None:
+    """Make the x axis one of timesteps from 1 to the last, with the collection phase in grey.
+
+    Args:
+        axes: whose axis it is.
+        last: timestep.
+        label: of the grey in a legend; '': none.
+    """
     from matplotlib.ticker import MaxNLocator
 
-    axes.axvspan(0.5, COLLECTION_TIMESTEPS + 0.5, color=BAND, zorder=0, linewidth=0, label="collection phase")
+    axes.axvspan(0.5, COLLECTION_TIMESTEPS + 0.5, color=BAND, zorder=0, linewidth=0, label=label)
     axes.set_xlim(0.5, last + 0.5)
     if last <= 25:
         axes.set_xticks(range(1, last + 1))
@@ -173,13 +178,6 @@ def planned_timesteps(record: RunRecord, analysis: RunAnalysis) -> int:
     """Return how many timesteps a figure of the run has room for: those planned, or that there were."""
     begun = [len(f.timesteps) + (f.unfinished is not None) for f in analysis.followers]
     return max(record.timesteps_planned or 0, *begun, COLLECTION_TIMESTEPS + 1)
-
-
-def robot_colour(robot: str) -> str:
-    """Return a robot's colour: the leader's, or that of follower n."""
-    if robot == LEADER:
-        return LEADER_COLOUR
-    return FOLLOWER_COLOURS[(int(robot.rpartition("_")[2]) - 1) % len(FOLLOWER_COLOURS)]
 
 
 def run_title(record: RunRecord, analysis: RunAnalysis) -> str:

@@ -28,6 +28,7 @@ from robot_formation.names import Message
 from robot_formation.parameters import suggestion
 
 _TRIANGLE_LIST = 11
+_FARTHEST_M = 1e6
 _LOGGED = (names.DISPLACEMENT, names.RESIDUAL, names.COMMANDED)
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
 
@@ -270,15 +271,15 @@ def _track(messages: Sequence[Message]) -> Track | None:
     if isinstance(messages, Odometry):
         order = np.argsort(messages.stamps_ns, kind="stable")
         yaws = np.array([yaw_rad(turn) for turn in messages.orientations.tolist()])
-        leans = _ups(messages.orientations)[:, :2]
-        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order], leans[order])
+        tilts = _ups(messages.orientations)[:, :2]
+        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order], tilts[order])
     poses = [message.pose.pose for message in messages]
     stamps = np.array([_stamp_ns(message) for message in messages], dtype=np.int64)
     positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
     yaws = np.array([_yaw(pose.orientation) for pose in poses])
-    leans = np.array([_up(pose.orientation)[:2] for pose in poses])
+    tilts = np.array([_up(pose.orientation)[:2] for pose in poses])
     order = np.argsort(stamps, kind="stable")
-    return Track(stamps[order], positions[order], yaws[order], leans[order])
+    return Track(stamps[order], positions[order], yaws[order], tilts[order])
 
 
 def _overhead(
@@ -349,13 +350,19 @@ def _dots(places_m: NDArray[np.float64], turns: NDArray[np.float64], height_m: f
 
 
 def read_ground(marker: Message) -> Ground | None:
-    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices; None for others."""
+    """Turn a TRIANGLE_LIST marker, unrotated in the world frame, into a mesh with shared vertices.
+
+    None for others, and for one whose corners aren't numbers of a ground's size.
+    """
     if marker.type != _TRIANGLE_LIST or len(marker.points) < 3:
         return None
     corners = np.array([(point.x, point.y, point.z) for point in marker.points])
     scale = np.array([marker.scale.x, marker.scale.y, marker.scale.z])
     origin = marker.pose.position
-    corners = corners * scale + (origin.x, origin.y, origin.z)
+    with np.errstate(over="ignore", invalid="ignore"):  # any numbers
+        corners = corners * scale + (origin.x, origin.y, origin.z)
+    if not (np.abs(corners) < _FARTHEST_M).all():
+        return None
     vertices, numbers = np.unique(corners.round(6), axis=0, return_inverse=True)
     count = len(corners) // 3
     return Ground(vertices, numbers.reshape(-1)[: 3 * count].reshape(count, 3))

@@ -8,8 +8,8 @@ error in motion
     neighbour was s seconds after it had begun to move in t - 1, and at most at the end of that timestep.
 gap
     distance of two neighbours' bodies seen from above, at the ground or at the height of their tops, whichever is less
-    (on a bowl they lean towards each other). It is a lower bound: towards a corner the true distance is larger, and
-    bodies at different heights are taken for level.
+    (on a bowl they are tilted towards each other). It is a lower bound: towards a corner the true distance is larger,
+    and bodies at different heights are taken for level.
 touch
     an episode that begins with a gap below a millimetre, and ends with one above 5 mm.
 """
@@ -53,8 +53,8 @@ class Course:
     @classmethod
     def of(cls, track: Track, period_s: float) -> Course:
         """Make it from a track; a pause of more than one and a half periods is a stand, which ends a period before."""
-        leans = np.zeros((len(track.stamps_ns), 2)) if track.leans is None else track.leans
-        poses = np.column_stack([track.positions_m[:, :2], np.unwrap(track.yaws_rad), leans])
+        tilts = np.zeros((len(track.stamps_ns), 2)) if track.tilts is None else track.tilts
+        poses = np.column_stack([track.positions_m[:, :2], np.unwrap(track.yaws_rad), tilts])
         period_ns = round(1e9 * period_s)
         pauses = np.flatnonzero(np.diff(track.stamps_ns) > 1.5 * period_ns)
         return cls(

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 DPI = 150
 _GAP = 0.01  # between a legend and the figure's lower edge, share of the figure's height
+# Looks the same where the font is missing; without a salt of its own the names in it are random.
+_SVG: Any = {"svg.fonttype": "path", "svg.hashsalt": "robot_formation"}
 _TIMELESS = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 
 
@@ -59,12 +61,17 @@ def legend_below(figure: Figure, handles: Sequence[object], columns: int, **styl
 def save_figure(figure: Figure, path: str | Path) -> Path:
     """Write a figure in the format that the path's ending says; an older file there is replaced.
 
+    Texts of an SVG become outlines, unless the caller has set matplotlib's svg.hashsalt and chosen.
+
     Raises:
         AnalysisError: the file can't be written.
     """
+    from matplotlib import rc_context, rcParams
+
     try:
-        # Without the time of day.
-        figure.savefig(path, dpi=DPI, metadata=_TIMELESS.get(Path(path).suffix.lower()))
+        with rc_context({} if rcParams["svg.hashsalt"] else _SVG):
+            # Without the time of day.
+            figure.savefig(path, dpi=DPI, metadata=_TIMELESS.get(Path(path).suffix.lower()))
     except OSError as error:
         raise AnalysisError(f"{path} can't be written: {error.strerror or error}; choose another folder") from error
     return Path(path)

@@ -49,13 +49,13 @@ class Track:
         stamps_ns: (n,) nanoseconds.
         positions_m: (n, 3) x, y, z.
         yaws_rad: (n,) heading, anticlockwise from world x.
-        leans: (n, 2) x and y of base_link's z axis, a unit vector; None: upright.
+        tilts: (n, 2) x and y of base_link's z axis, a unit vector; None: upright.
     """
 
     stamps_ns: NDArray[np.int64]
     positions_m: NDArray[np.float64]
     yaws_rad: NDArray[np.float64]
-    leans: NDArray[np.float64] | None = None
+    tilts: NDArray[np.float64] | None = None
 
     def at(self, stamp_ns: int) -> Motion | None:
         """Return the last pose at or before the stamp in the world's plane, if there is any."""

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
+from robot_formation.names import LEADER
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -40,10 +42,16 @@ STYLE: Any = {
     "axes.axisbelow": True,
     "grid.color": "0.88",
     "grid.linewidth": 0.6,
-    "svg.fonttype": "path",  # looks the same where the font is missing
-    "svg.hashsalt": "robot_formation",  # else the names in it are random
+    "text.parse_math": False,  # no formulas: a "$" in a name is a dollar
     "pdf.fonttype": 42,
 }
+
+
+def robot_colour(robot: str) -> str:
+    """Return a robot's colour: the leader's, or that of follower n."""
+    if robot == LEADER:
+        return LEADER_COLOUR
+    return FOLLOWER_COLOURS[(int(robot.rpartition("_")[2]) - 1) % len(FOLLOWER_COLOURS)]
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:

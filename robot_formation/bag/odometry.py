@@ -15,10 +15,14 @@ ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
 _HEAD = 4  # of a CDR message: what follows is aligned from here on
 _LITTLE_ENDIAN = 1
 _POSE_NUMBERS = 7  # x, y, z of the place, x, y, z, w of the orientation
+_FARTHEST_M = 1e6
+_MOST_OFF_UNIT = 1e-3  # length of a quaternion
 
 
 class Odometry(Sequence[Message]):
     """The messages of a topic, decoded one by one when they are asked for.
+
+    Messages whose pose is none are left out: see `are_poses`.
 
     Attributes:
         stamps_ns: (n,) nanoseconds, as the messages tell.
@@ -30,17 +34,19 @@ class Odometry(Sequence[Message]):
     """
 
     def __init__(self, cdr: Sequence[bytes]) -> None:
-        self._cdr = cdr
         columns = _columns(cdr)
         if columns is None:
-            messages = [self[index] for index in range(len(cdr))]
+            messages = [_decoded(message) for message in cdr]
             poses = [message.pose.pose for message in messages]
             stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages]
             places = [(p.position.x, p.position.y, p.position.z) for p in poses]
             turns = [(p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w) for p in poses]
             columns = np.array(stamps, dtype=np.int64), np.hstack([np.array(places), np.array(turns)])
-        self.stamps_ns, poses_of = columns
-        self.positions_m, self.orientations = poses_of[:, :3], poses_of[:, 3:]
+        stamps_of, poses_of = columns
+        kept = are_poses(poses_of[:, :3], poses_of[:, 3:])
+        self._cdr = [cdr[index] for index in np.flatnonzero(kept).tolist()]
+        self.stamps_ns = stamps_of[kept]
+        self.positions_m, self.orientations = poses_of[kept, :3], poses_of[kept, 3:]
 
     def __len__(self) -> int:
         return len(self._cdr)
@@ -54,7 +60,19 @@ class Odometry(Sequence[Message]):
     def __getitem__(self, index: int | slice) -> Message | Sequence[Message]:
         if isinstance(index, slice):
             return [self[each] for each in range(*index.indices(len(self)))]
-        return jazzy_typestore().deserialize_cdr(self._cdr[index], ODOMETRY_TYPE)
+        return _decoded(self._cdr[index])
+
+
+def are_poses(positions_m: NDArray[np.float64], orientations: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which of some poses, (n, 3) and (n, 4), are poses: finite places near the world, unit quaternions."""
+    with np.errstate(over="ignore", invalid="ignore"):  # any numbers
+        near = (np.abs(positions_m) < _FARTHEST_M).all(axis=1)
+        unit = np.abs(np.linalg.norm(orientations, axis=1) - 1.0) < _MOST_OFF_UNIT
+    return np.asarray(near & unit)
+
+
+def _decoded(cdr: bytes) -> Message:
+    return jazzy_typestore().deserialize_cdr(cdr, ODOMETRY_TYPE)
 
 
 def _columns(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:

@@ -6,14 +6,13 @@ import argparse
 from pathlib import Path
 
 from robot_formation.cli.parser import Subparsers
+from robot_formation.cli.picture_format import add_format
 
 DESCRIPTION = """\
 Set runs side by side: totals in a table, corrections, errors and trajectories in pictures, and in what the runs' own
 descriptions (scenario, parameters, versions) differ. BAG is what 'formation analyze' takes. Rows 'along u' are to the
 right, 'along v' forward.
 """
-
-FORMATS = ("png", "svg", "pdf")
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -26,13 +25,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print JSON and nothing else; pictures are drawn only if --out is given"
     )
-    parser.add_argument(
-        "--format",
-        metavar="KIND",
-        choices=FORMATS,
-        default=FORMATS[0],
-        help=f"kind of the pictures: {', '.join(FORMATS)} (default: {FORMATS[0]})",
-    )
+    add_format(parser)
     parser.add_argument("--no-pictures", action="store_true", help="draw no pictures")
     parser.add_argument(
         "--namespace", metavar="NS", help="the formations' namespace, where bags hold several formations"

@@ -49,6 +49,6 @@ def run(args: argparse.Namespace) -> int:
     from robot_formation.reporting.report import default_path, report_page
     from robot_formation.system.files import size_text
 
-    page = write_page(report_page(args.sources, args.namespace), args.out or default_path(args.sources))
+    page = write_page(lambda: report_page(args.sources, args.namespace), args.out or default_path(args.sources))
     print(f"report: {page} ({size_text(page.stat().st_size)})")
     return 0

@@ -10,7 +10,8 @@ from pathlib import Path
 from robot_formation.analysis.sweep_summary import summarise
 from robot_formation.experiment.sweep import Row
 from robot_formation.paper.comparison import Comparison, Ours, reduction
-from robot_formation.paper.statements import ARXIV, FIGURES, PaperFigure
+from robot_formation.paper.statements import FIGURES, PaperFigure
+from robot_formation.reporting.citation import ARXIV
 
 _TYPES = {".png": "image/png", ".svg": "image/svg+xml"}
 _WORDS = {True: "agrees", False: "differs", None: "unknown"}

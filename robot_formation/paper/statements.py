@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-ARXIV = "https://arxiv.org/abs/2205.04052"
-
 
 @dataclass(frozen=True)
 class Statement:

@@ -9,6 +9,9 @@ from robot_formation.json_values import Json, JsonObject
 from robot_formation.paths import share_dir
 from robot_formation.system.yaml_files import read_yaml
 
+ARXIV = "https://arxiv.org/abs/2205.04052"
+"""The paper."""
+
 _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "_&%#$"})
 
 

@@ -14,6 +14,7 @@ from robot_formation.analysis.plotting import legend_below, new_figure, save_fig
 from robot_formation.analysis.quantities import FollowerAnalysis, Timestep
 from robot_formation.analysis.report import made_folder
 from robot_formation.analysis.run_record import Ground
+from robot_formation.analysis.style import AUXILIARY, BAND, LOST_COLOUR, PALETTE, styled
 from robot_formation.bag.folder import bag_name
 from robot_formation.names import LEADER
 from robot_formation.reporting.runs import Run, follower_names
@@ -22,9 +23,7 @@ from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's palette, safe for colour-blind readers, without its yellow; runs differ by their marks too.
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000")
-_MARKS = "os^Dv<>"
+_MARKS = "os^Dv<>"  # runs differ by them too
 _LINES = ("-", "--", ":")
 _CM, _DEG = 100.0, math.degrees(1.0)
 _WIDTH = 5.6  # inches; can still be read when a page shrinks it to a phone's width
@@ -56,6 +55,7 @@ def comparison_folder(first: Path) -> Path:
     return first.resolve().with_name(f"{bag_name(first)}_comparison")
 
 
+@styled
 def draw_corrections_by_timestep(runs: Sequence[Run], path: Path) -> Path:
     """Draw each timestep's correction distance, u and v together: a line per run, a panel per follower.
 
@@ -69,12 +69,13 @@ def draw_corrections_by_timestep(runs: Sequence[Run], path: Path) -> Path:
         _lines(axes, runs, name, _correction_cm)
         axes.set_ylabel("correction (cm)")
         axes.set_title(name.replace("_", " "), loc="left", fontsize=10)
-        axes.axvspan(0.5, COLLECTION_TIMESTEPS + 0.5, color="0.92", zorder=0)
+        axes.axvspan(0.5, COLLECTION_TIMESTEPS + 0.5, color=BAND, zorder=0)
     panels[-1].set_xlabel("timestep (grey: collection phase)")
     _legend(figure, runs)
     return save_figure(figure, path)
 
 
+@styled
 def draw_errors_by_timestep(runs: Sequence[Run], path: Path) -> Path:
     """Draw each timestep's formation error and heading error: a line per run, two panels per follower.
 
@@ -90,13 +91,14 @@ def draw_errors_by_timestep(runs: Sequence[Run], path: Path) -> Path:
         upper.set_ylabel("formation error (cm)")
         upper.set_title(name.replace("_", " "), loc="left", fontsize=10)
         _lines(lower, runs, name, _heading_error_deg)
-        lower.axhline(0.0, color="0.55", linewidth=0.8, zorder=1)
+        lower.axhline(0.0, color=AUXILIARY, linewidth=0.8, zorder=1)
         lower.set_ylabel("heading error (deg)")
     panels[-1].set_xlabel("timestep")
     _legend(figure, runs)
     return save_figure(figure, path)
 
 
+@styled
 def draw_trajectories(runs: Sequence[Run], path: Path) -> Path:
     """Draw the true paths of all robots from above over contour lines: the leader thin, a panel per ground.
 
@@ -134,12 +136,10 @@ def _lines(axes: Axes, runs: Sequence[Run], name: str, of: Callable[[Timestep], 
         known = [math.nan if value is None else value for value in values]
         axes.plot(numbers, known, **_style(run), markersize=0 if many else 4)
         if follower.lost and numbers:
-            axes.plot(numbers[-1:], known[-1:], "x", color="#D00000", markersize=10, markeredgewidth=2.5, zorder=5)
+            axes.plot(numbers[-1:], known[-1:], "x", color=LOST_COLOUR, markersize=10, markeredgewidth=2.5, zorder=5)
     axes.set_xlim(0.5, max(longest, COLLECTION_TIMESTEPS + 1) + 0.5)
     axes.xaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], integer=True))
-    axes.grid(color="0.88", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid()
 
 
 def _planned(run: Run, follower: FollowerAnalysis) -> int:
@@ -149,8 +149,8 @@ def _planned(run: Run, follower: FollowerAnalysis) -> int:
 def _style(run: Run) -> dict[str, Any]:
     number = run.number - 1
     return {
-        "color": COLOURS[number % len(COLOURS)],
-        "linestyle": _LINES[number // len(COLOURS) % len(_LINES)],
+        "color": PALETTE[number % len(PALETTE)],
+        "linestyle": _LINES[number // len(PALETTE) % len(_LINES)],
         "marker": _MARKS[number % len(_MARKS)],
         "linewidth": 1.5,
     }
@@ -233,5 +233,4 @@ def _legend(figure: Any, runs: Sequence[Run]) -> None:
 
 def _short(name: str) -> str:
     short = name if len(name) <= 60 else f"{name[:28]} ... {name[-27:]}"
-    printable = "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in short)
-    return printable.replace("$", r"\$")  # matplotlib takes what is between dollars for a formula
+    return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in short)

@@ -17,23 +17,23 @@ _NONE = "-"
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ComparisonTable:
     """A table: its title, and rows of a quantity's name and its value in each run."""
 
     title: str
     rows: tuple[tuple[str, tuple[str, ...]], ...]
 
 
-def comparisons(runs: Sequence[Run]) -> list[Comparison]:
+def comparisons(runs: Sequence[Run]) -> list[ComparisonTable]:
     """Set runs side by side: what they were and how they ended, then each follower's totals."""
     return [_overview(runs), *(_follower(name, runs) for name in follower_names(runs))]
 
 
-def differing_rows(runs: Sequence[Run], most: int = 60) -> Comparison:
+def differing_rows(runs: Sequence[Run], most: int = 60) -> ComparisonTable:
     """Set side by side what the runs say differently of themselves; values are cut to so many characters."""
     found = differing([run.record.details for run in runs])
     rows = [(name, tuple(value_text(entry, most) for entry in values)) for name, values in found.items()]
-    return Comparison("What differs", tuple(rows))
+    return ComparisonTable("What differs", tuple(rows))
 
 
 def comparison_text(runs: Sequence[Run]) -> str:
@@ -56,7 +56,7 @@ def comparison_json(runs: Sequence[Run]) -> JsonObject:
     }
 
 
-def _overview(runs: Sequence[Run]) -> Comparison:
+def _overview(runs: Sequence[Run]) -> ComparisonTable:
     facts = [{**run.facts, "scenario": run.analysis.scenario, "outcome": run.analysis.outcome} for run in runs]
     rows = [
         (name, tuple(value_text(each[name]) for each in facts))
@@ -64,15 +64,15 @@ def _overview(runs: Sequence[Run]) -> Comparison:
     ]
     rows.append(("followers", tuple(str(len(run.analysis.followers)) for run in runs)))
     rows.append(("simulated time (s)", tuple(f"{run.record.simulated_s:.1f}" for run in runs)))
-    return Comparison("Runs", tuple(rows))
+    return ComparisonTable("Runs", tuple(rows))
 
 
-def _follower(name: str, runs: Sequence[Run]) -> Comparison:
+def _follower(name: str, runs: Sequence[Run]) -> ComparisonTable:
     followers = [run.follower(name) for run in runs]
     rows = [(title, tuple(_cell(follower, write) for follower in followers)) for title, write in _ROWS]
     rows.insert(_AGAINST_FIRST, (f"  against {runs[0].label} (%)", _against_first(followers)))
     told = [row for row in rows if not set(row[1]) <= ({_NONE, "0", "0.00"} if row[0] in _RARE else {_NONE})]
-    return Comparison(name.replace("_", " "), tuple(told))
+    return ComparisonTable(name.replace("_", " "), tuple(told))
 
 
 def _cell(follower: FollowerAnalysis | None, write: Callable[[JsonObject], str]) -> str:
@@ -132,7 +132,7 @@ _RARE = ("lag (cm)", "blind timesteps")  # left out where they are 0 in all runs
 _AGAINST_FIRST = 2  # place of the row below the correction distance
 
 
-def _aligned(heads: Sequence[str], found: Comparison) -> str:
+def _aligned(heads: Sequence[str], found: ComparisonTable) -> str:
     lines = [tuple(heads), *((name, *values) for name, values in found.rows)]
     first, *others = (max(len(line[column]) for line in lines) for column in range(len(heads)))
     texts = [

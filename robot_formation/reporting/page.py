@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from robot_formation.errors import FormationError
 from robot_formation.reporting.inline_svg import greys
 from robot_formation.reporting.markup import element, page_text, paragraph
+from robot_formation.system.files import check_writable, write_whole
 
 MOST_BYTES = 5_000_000
 """Size of the largest page."""
@@ -98,18 +100,32 @@ def page(title: str, lead: str, sections: Sequence[Element]) -> str:
     return page_text(element("html", head, body, lang="en"))
 
 
-def write_page(text: str, path: Path) -> Path:
+def write_page(make: Callable[[], str], path: Path) -> Path:
     """Write a page; an older file there is replaced, its folder is made if it is missing.
+
+    Args:
+        make: makes its text, once it is known that it can be written.
+        path: where to.
 
     Raises:
         PageError: the file can't be written.
     """
-    try:
+    with _told(path):
+        there = next(folder for folder in path.parents if folder.exists())
+        check_writable(there / path.relative_to(there).parts[0])  # its folder is made with it
+    text = make()
+    with _told(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, text.encode("utf-8"))
+    return path
+
+
+@contextlib.contextmanager
+def _told(path: Path) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
         raise PageError(f"{path} can't be written: {error.strerror or error}; choose another --out") from error
-    return path
 
 
 def _style(used: Sequence[str]) -> str:

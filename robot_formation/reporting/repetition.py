@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from robot_formation.bag.run_details import node_parameters
+from robot_formation.bag.run_details import mapping, node_parameters, said_slots
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.scenario import FOLLOWS_FROM_SETUP, Scenario
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.parameters import to_mapping
+from robot_formation.world.pushes import read_push
 
 _PRESET = "track_"
 _OPTIONS = {"predictor.name": "--predictor", "leader.path": "--path", "world.camera.mode": "--camera"}
@@ -53,28 +55,39 @@ def _found(details: Mapping[str, str], nodes: dict[str, JsonObject]) -> tuple[Re
     track = name.removeprefix(_PRESET)
     preset = track if name.startswith(_PRESET) and track in scenarios.track_names() else _DEFAULT_TRACK
     words = ["formation", "run", "--track", preset]
-    settings = _setup(name, nodes, scenarios.load_track(preset))
+    settings = _setup(name, details, nodes, scenarios.load_track(preset))
     scenario = scenarios.override(scenarios.load_track(preset), settings)
+    tried: set[str] = set()
     # What one setting changes, others may follow: the rest is looked for again.
     for _ in range(len(KINDS)):
-        more = list(_differing(nodes, scenario))
+        more = [setting for setting in _differing(nodes, scenario) if setting not in tried]
         if not more:
             break
-        try:
-            scenario = scenarios.override(scenario, more)
-        except FormationError:
-            break
-        settings += more
+        tried.update(more)
+        scenario, taken = _with(scenario, more)
+        settings += taken
     own = scenario.by_node()
     gone = [f"{node}.{name}" for node in KINDS for name in nodes[node] if name not in own[node]]
     missed = (*(name for name, _ in _other(nodes, scenario)), *gone)
     return Repetition(shlex.join([*words, *_as_options(settings)]), missed), scenario
 
 
-def _setup(name: str, nodes: dict[str, JsonObject], preset: Scenario) -> list[str]:
+def _with(scenario: Scenario, settings: list[str]) -> tuple[Scenario, list[str]]:
+    """Apply settings together, or each alone and without those that are refused; return those that were applied."""
+    try:
+        return scenarios.override(scenario, settings), settings
+    except FormationError:
+        taken = []
+    for setting in settings:
+        with contextlib.suppress(FormationError):  # it is named among what is missed
+            scenario = scenarios.override(scenario, [setting])
+            taken.append(setting)
+    return scenario, taken
+
+
+def _setup(name: str, details: Mapping[str, str], nodes: dict[str, JsonObject], preset: Scenario) -> list[str]:
     """Write the setup of a run that has these parameters as settings KEY=VALUE, as far as the preset's is another."""
     world, fine_tuner = nodes["world"], nodes["fine_tuner"]
-    blackouts = fine_tuner["blackouts"]
     wanted: JsonObject = {
         "name": name,
         "seed": world["seed"],
@@ -83,7 +96,9 @@ def _setup(name: str, nodes: dict[str, JsonObject], preset: Scenario) -> list[st
         "spacing": fine_tuner["spacing"],
         "marker": world["marker.kind"],
         "heading_deg": _degrees(world["start_heading_rad"][0]),
-        "blackouts": [list(pair) for pair in zip(blackouts[::2], blackouts[1::2], strict=True)],
+        "slots": _slots(details, fine_tuner["formation_distance_m"]),
+        "blackouts": _blackouts(fine_tuner["blackouts"], mapping(details, "own_blackouts")),
+        "pushes": [_push_row(text) for text in world.get("pushes", [])],
     }
     own = to_mapping(preset.setup)
     settings = [f"{key}={_yaml(value)}" for key, value in wanted.items() if value not in (own[key], "")]
@@ -97,6 +112,31 @@ def _setup(name: str, nodes: dict[str, JsonObject], preset: Scenario) -> list[st
     if (chosen.start_x_m, chosen.start_y_m) != start:
         settings += [f"start_x_m={_yaml(start[0])}", f"start_y_m={_yaml(start[1])}"]
     return settings
+
+
+def _slots(details: Mapping[str, str], distance_m: float) -> list[list[float]]:
+    """Return the places as a scenario has them; none where all are abreast in the fine-tuner's distance."""
+    slots = said_slots(details)
+    return [] if all(place == (distance_m, 0.0) for place in slots) else [list(place) for place in slots]
+
+
+def _blackouts(of_all: list[int], own: JsonObject) -> list[list[Json]]:
+    """Return rows of blackouts as a scenario has them: those of all, then what single followers have beside them."""
+    common = _pairs(of_all)
+    rows: list[list[Json]] = [*common]
+    for robot, numbers in own.items():
+        rows += [[robot, *pair] for pair in _pairs(numbers) if pair not in common]
+    return rows
+
+
+def _pairs(numbers: list[int]) -> list[list[Json]]:
+    return [list(pair) for pair in zip(numbers[::2], numbers[1::2], strict=True)]
+
+
+def _push_row(text: str) -> list[Json]:
+    """Return a push as a scenario has it, from the text that the world has."""
+    push = read_push(text, "'pushes'")
+    return [push.robot, push.timestep, push.x_m, push.y_m]
 
 
 def _differing(nodes: dict[str, JsonObject], scenario: Scenario) -> Iterator[str]:

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 import robot_formation
 from robot_formation.analysis.report import pictures_folder
 from robot_formation.experiment.sweep import is_sweep
-from robot_formation.reporting.citation import bibtex
+from robot_formation.reporting.citation import ARXIV, bibtex
 from robot_formation.reporting.comparison_sections import anchor, comparison_sections
 from robot_formation.reporting.markup import element, paragraph, section
 from robot_formation.reporting.page import PageSpace, page
@@ -18,7 +18,6 @@ from robot_formation.reporting.runs import ReportError, Run, load_runs
 from robot_formation.reporting.sweep_sections import Sweep, load_sweep, sweep_sections
 from robot_formation.system.temporary_folder import RUN, temporary_folder
 
-_PAPER = "https://doi.org/10.48550/arXiv.2205.04052"
 _NO_ROOM = "Left out: with it the page would be larger than 5 MB. A report of this one alone has it."
 
 
@@ -84,7 +83,7 @@ def _sections(runs: Sequence[Run], sweeps: Sequence[Sweep], folder: Path) -> Ite
 
 
 def _cite() -> Element:
-    link = element("a", "doi.org/10.48550/arXiv.2205.04052", href=_PAPER)
+    link = element("a", "arXiv:2205.04052", href=ARXIV)
     return section(
         "Cite",
         paragraph("The project, and the paper whose method it implements (", link, "):"),

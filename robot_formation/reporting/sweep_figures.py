@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from robot_formation.analysis.plotting import legend_below, new_figure, save_figure
+from robot_formation.analysis.style import LOST_COLOUR, PALETTE, styled
 from robot_formation.analysis.sweep_summary import BASELINE
 from robot_formation.experiment.sweep import Row
 from robot_formation.json_values import JsonObject
-from robot_formation.reporting.comparison_figures import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,10 +25,10 @@ _QUANTITIES = (
     ("formation_error_rmse_m", "formation error, RMSE (cm)"),
 )
 _HALF = 0.22  # from a predictor's place to its points' and to its median's
-_LOST = "#D00000"
 _LEAST_SHOWN = -150.0  # per cent; a predictor that corrects little may multiply what is nearly nothing
 
 
+@styled
 def draw_distributions(rows: Sequence[Row], summary: Sequence[JsonObject], path: Path, most_seeds: int) -> Path:
     """Draw the runs of one track, path and surface: a point per run, a line per seed, medians with intervals.
 
@@ -51,9 +51,7 @@ def draw_distributions(rows: Sequence[Row], summary: Sequence[JsonObject], path:
             _median(axes, number, entry[key])
         axes.set_ylabel(title)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-        axes.grid(axis="y", color="0.88", linewidth=0.6)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        axes.grid(axis="y")
     turned = {"rotation": 30, "ha": "right"} if sum(map(len, predictors)) > 40 else {}
     panels[-1].set_xticks(range(len(predictors)), predictors, **turned)
     panels[-1].set_xlim(-0.6, len(predictors) - 0.4)
@@ -61,6 +59,7 @@ def draw_distributions(rows: Sequence[Row], summary: Sequence[JsonObject], path:
     return save_figure(figure, path)
 
 
+@styled
 def draw_reductions(summary: Sequence[JsonObject], path: Path) -> Path:
     """Draw each predictor's reduction against `previous` with its interval: a row per track, path and surface.
 
@@ -91,8 +90,7 @@ def draw_reductions(summary: Sequence[JsonObject], path: Path) -> Path:
     axes.set_ylim(len(groups) - 0.5, -0.5)
     axes.set_yticks(range(len(groups)), groups)
     axes.set_xlabel("reduction against previous (%)")
-    axes.grid(axis="x", color="0.88", linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(axis="x")
     handles = [Line2D([], [], linestyle="none", label=name, **_mark(numbers[name])) for name in predictors]
     legend_below(figure, handles, min(3, len(handles)), fontsize=9)
     return save_figure(figure, path)
@@ -127,7 +125,7 @@ def _points(axes: Axes, rows: Sequence[Row], predictors: Sequence[str], seeds: S
     for number, name in enumerate(predictors):
         count = sum(predictor == name for predictor, _ in lost)
         if count:
-            style: dict[str, Any] = {"color": _LOST, "fontsize": 9, "ha": "center", "va": "bottom"}
+            style: dict[str, Any] = {"color": LOST_COLOUR, "fontsize": 9, "ha": "center", "va": "bottom"}
             axes.text(number, 1.01, f"× {count} lost", transform=axes.get_xaxis_transform(), **style)
 
 
@@ -137,7 +135,7 @@ def _median(axes: Axes, number: int, found: dict[str, float | None] | None) -> N
         return
     if found["median"] is None:
         upper = axes.get_xaxis_transform()
-        axes.text(number + _HALF, 0.98, "lost", transform=upper, color=_LOST, ha="center", va="top", fontsize=9)
+        axes.text(number + _HALF, 0.98, "lost", transform=upper, color=LOST_COLOUR, ha="center", va="top", fontsize=9)
         return
     middle = found["median"] * _CM
     low = middle if found["low"] is None else found["low"] * _CM
@@ -161,7 +159,9 @@ def _median(axes: Axes, number: int, found: dict[str, float | None] | None) -> N
 def _interval(axes: Axes, place: float, found: dict[str, float | None], edge: float, number: int) -> None:
     """Draw a reduction with its interval; what is beyond the left edge, or infinitely bad, ends there in an arrow."""
     if found["median"] is None:
-        axes.annotate("lost", (edge, place), (3, 0), textcoords="offset points", va="center", fontsize=9, color=_LOST)
+        axes.annotate(
+            "lost", (edge, place), (3, 0), textcoords="offset points", va="center", fontsize=9, color=LOST_COLOUR
+        )
         return
     middle = 100.0 * found["median"]
     left = edge if found["low"] is None else max(100.0 * found["low"], edge)
@@ -178,7 +178,7 @@ def _mark(number: int) -> dict[str, Any]:
 
 
 def _colour(number: int) -> str:
-    return COLOURS[number % len(COLOURS)]
+    return PALETTE[number % len(PALETTE)]
 
 
 def _known(value: float | None) -> float:
@@ -200,5 +200,5 @@ def _legend(figure: Any, some_lost: bool) -> None:
         Line2D([], [], marker="D", color="0.4", linewidth=2.0, markersize=6, label="median, 95 % interval"),
     ]
     if some_lost:
-        handles.append(Line2D([], [], linestyle="none", marker="x", color=_LOST, label="lost runs"))
+        handles.append(Line2D([], [], linestyle="none", marker="x", color=LOST_COLOUR, label="lost runs"))
     legend_below(figure, handles, 4, fontsize=9)

@@ -1,10 +1,11 @@
-"""Opening files that somebody else named: regular files of a bounded size only.
+"""Opening files that somebody else named, regular files of a bounded size only; and writing files whole.
 
 A named pipe would be waited for without end, and a device such as /dev/zero has none.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import io
 import os
@@ -87,6 +88,45 @@ def whole_lines(path: str | Path) -> Iterator[str]:
                 raise ValueError(f"line {number} has more than {MOST_LINE_CHARACTERS} characters")
             if line.endswith("\n"):
                 yield line
+
+
+def check_writable(path: Path) -> None:
+    """Check that a file can be written, before the work that makes its content.
+
+    Raises:
+        OSError: there is no place for it.
+    """
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "Is a directory", str(path))
+    with unfinished_file(path):
+        pass
+
+
+@contextlib.contextmanager
+def unfinished_file(path: Path) -> Iterator[Path]:
+    """Make a file beside the one that is to be, which is gone at the end unless it has been renamed.
+
+    Raises:
+        OSError: it can't be written.
+    """
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        unfinished.touch()
+        yield unfinished
+    finally:
+        with contextlib.suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file, or leave an older one there as it is.
+
+    Raises:
+        OSError: it can't be written.
+    """
+    with unfinished_file(path) as unfinished:
+        unfinished.write_bytes(content)
+        unfinished.replace(path)
 
 
 def size_text(size_bytes: int) -> str:

@@ -12,12 +12,12 @@ import numpy as np
 from robot_formation.analysis.report import made_folder, pictures_folder
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.reader import read_bag
+from robot_formation.system.files import check_writable
 from robot_formation.viewing.animation_figure import AnimationFigure
 from robot_formation.viewing.animation_file import (
     AnimationError,
     Picture,
     check_format,
-    check_writable,
     write_gif,
     write_mp4,
     write_png,
@@ -106,7 +106,10 @@ def animate(
         scene, camera = RecordedScene(of_formation, follower), ReplayedCamera(of_formation, follower)
         stamps = picture_stamps(scene.start_ns, scene.end_ns, every_s)
         out = out or made_folder(pictures_folder(bag)) / "animation.gif"
-        check_writable(out)
+        try:
+            check_writable(out)  # drawing takes a while
+        except OSError as error:
+            raise AnimationError(f"{out} can't be written: {error.strerror or error}; choose another place") from error
         figure = AnimationFigure(scene, camera, width_px + width_px % 2)
         if out.suffix.lower() == ".png":
             stamps = stamps[-1:]

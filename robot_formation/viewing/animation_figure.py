@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.analysis.style import styled
+from robot_formation.analysis.figures import run_title
+from robot_formation.analysis.style import robot_colour, styled
 from robot_formation.viewing.camera_panel import CameraPanel
 from robot_formation.viewing.place_panel import PlacePanel
-from robot_formation.viewing.plan_panel import FORECAST_COLOUR, PLACE_COLOUR, VIEW_COLOUR, PlanPanel, robot_colour
+from robot_formation.viewing.plan_panel import FORECAST_COLOUR, PLACE_COLOUR, VIEW_COLOUR, PlanPanel
 from robot_formation.viewing.recorded_scene import RecordedScene
 from robot_formation.viewing.replayed_camera import ReplayedCamera
 from robot_formation.viewing.timestep_panel import TimestepPanel
@@ -48,7 +49,7 @@ class AnimationFigure:
         follower = scene.follower.replace("_", " ")
         plan, view = _axes(figure, (0.075, 0.425, 0.445, 0.53)), _axes(figure, (0.545, 0.60, 0.435, 0.335))
         steps, place = _axes(figure, (0.075, 0.085, 0.56, 0.24)), _axes(figure, (0.72, 0.085, 0.265, 0.265))
-        figure.text(0.012, 0.972, _title(scene), fontsize=11, fontweight="bold", va="center")
+        figure.text(0.012, 0.972, run_title(scene.record, scene.analysis), fontsize=11, fontweight="bold", va="center")
         source = "rendered from ground truth" if camera.rendered else "as recorded"
         view.set_title(f"{follower}'s camera, {source}", loc="left", fontsize=9)
         place.set_title(f"{follower} from its place", loc="left", fontsize=9)
@@ -101,15 +102,6 @@ def _canvas(figure: Figure) -> Any:
 
 def _axes(figure: Figure, place: tuple[float, float, float, float]) -> Any:
     return figure.add_axes(place)
-
-
-def _title(scene: RecordedScene) -> str:
-    details = scene.record.details
-    parts = [(scene.analysis.scenario or "formation run").replace("_", " ")]
-    parts += [details["surface"]] if details.get("surface") else []
-    parts += [f"{details['predictor']} predictor"] if details.get("predictor") else []
-    parts += [f"seed {details['seed']}"] if details.get("seed") else []
-    return " · ".join(parts)
 
 
 def _legend(scene: RecordedScene) -> list[Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import shutil
 import subprocess
 import tempfile
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from robot_formation.errors import FormationError
+from robot_formation.system.files import unfinished_file
 from robot_formation.viewing.gif_palette import Palette
 
 Picture = NDArray[np.uint8]
@@ -40,18 +40,6 @@ def check_format(path: Path) -> None:
         raise AnimationError(f"'{path.name}' is no animation: end its name with {', '.join(SUFFIXES)}")
     if suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise AnimationError(f"{path}: an MP4 needs the program ffmpeg, which is not installed; write a .gif instead")
-
-
-def check_writable(path: Path) -> None:
-    """Check that the file can be written, before its pictures are drawn, which takes a while.
-
-    Raises:
-        AnimationError: there is no place for it.
-    """
-    if path.is_dir():
-        raise AnimationError(f"{path} can't be written: it is a folder; choose another name")
-    with _unfinished(path):
-        pass
 
 
 def write_gif(path: Path, pictures: Iterable[Picture], palette_of: Sequence[Picture], fps: float) -> None:
@@ -154,17 +142,13 @@ def _end(process: subprocess.Popen[bytes]) -> None:
 
 @contextlib.contextmanager
 def _unfinished(path: Path) -> Iterator[Path]:
-    """Make a file beside the one that is to be, which is gone at the end unless it has been renamed.
+    """Make a file beside the one that is to be: see `unfinished_file`.
 
     Raises:
         AnimationError: it can't be written.
     """
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.partial")
     try:
-        unfinished.touch()
-        yield unfinished
+        with unfinished_file(path) as unfinished:
+            yield unfinished
     except OSError as error:
         raise AnimationError(f"{path} can't be written: {error.strerror or error}; choose another folder") from error
-    finally:
-        with contextlib.suppress(OSError):
-            unfinished.unlink(missing_ok=True)

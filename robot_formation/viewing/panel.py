@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -14,6 +15,11 @@ Action = Callable[[], None]
 
 _PICTURE_QUALITY = 80
 _ERROR_STROKE, _CORRECTION_STROKE = "#0072b2", "#d55e00"
+
+
+def plain(text: str) -> str:
+    """Escape a text for viser's Markdown, which also takes HTML: words of a bag or of other nodes may hold anything."""
+    return re.sub(r"([\\`*_{}\[\]()#+.!|~<>&:@$=-])", r"\\\1", " ".join(text.split()))
 
 
 class Panel:
@@ -88,10 +94,10 @@ class Panel:
         now = moment.followers.get(self.follower, FollowerNow())
         finished = f"{now.finished} of {timesteps}" if timesteps else str(now.finished)
         lines = [
-            f"**{self.follower.replace('_', ' ')}** {now.words}",
+            f"**{plain(self.follower.replace('_', ' '))}** {plain(now.words)}",
             f"{moment.stamp_ns * 1e-9:.1f} s simulated, {finished} timesteps finished",
-            figures_in_words(figures),
-            remark,
+            plain(figures_in_words(figures)),
+            plain(remark),
         ]
         text = "\n\n".join(line for line in lines if line)
         if text != self._told:
@@ -110,7 +116,12 @@ class Panel:
             self._picture.image = picture
 
     def _choose(self, follower: str) -> None:
+        """Show another follower: what the last one saw and did is gone until there is something of this one."""
         self.follower, self._figures = follower, 0
+        for shown in (self._picture, self._plot):
+            if shown is not None:
+                shown.remove()
+        self._picture = self._plot = None
 
     def _queued(self, action: Action) -> Callable[[Any], None]:
         return lambda event: self._actions.put(action)

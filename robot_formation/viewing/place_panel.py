@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.analysis.style import robot_colour
 from robot_formation.geometry.se2 import Motion
-from robot_formation.viewing.plan_panel import FORECAST_COLOUR, PLACE_COLOUR, ellipse_uv_m, robot_colour
+from robot_formation.viewing.plan_panel import FORECAST_COLOUR, PLACE_COLOUR, ellipse_uv_m
 from robot_formation.viewing.recorded_scene import RecordedScene
 
 if TYPE_CHECKING:

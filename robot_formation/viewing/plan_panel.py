@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from robot_formation.analysis.quantiles import ELLIPSE_90
 from robot_formation.analysis.run_record import Ground
-from robot_formation.analysis.style import FACE_COLOURS, FOLLOWER_COLOURS, LEADER_COLOUR
+from robot_formation.analysis.style import FACE_COLOURS, robot_colour
 from robot_formation.geometry.se2 import Motion
-from robot_formation.names import LEADER
 from robot_formation.viewing.recorded_scene import PlaceForecast, RecordedScene
 
 if TYPE_CHECKING:
@@ -33,13 +32,6 @@ _VIEW_M = 0.45
 """Length to which the camera's field of view is drawn."""
 _FACE_COLOURS = tuple(FACE_COLOURS[face] for face in ("right", "front", "rear"))
 _ELLIPSE = np.linspace(0.0, 2.0 * np.pi, 49)
-
-
-def robot_colour(robot: str) -> str:
-    """Return a robot's colour: the leader's, or that of follower n."""
-    if robot == LEADER:
-        return LEADER_COLOUR
-    return FOLLOWER_COLOURS[(int(robot.rpartition("_")[2]) - 1) % len(FOLLOWER_COLOURS)]
 
 
 def ellipse_uv_m(forecast: PlaceForecast) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robot_formation import names
 from robot_formation.analysis.run_record import Ground
-from robot_formation.analysis.style import FOLLOWER_COLOURS, LEADER_COLOUR
+from robot_formation.analysis.style import robot_colour
 from robot_formation.geometry.orientation import Quaternion, Vector
 from robot_formation.geometry.se2 import Motion
 from robot_formation.viewing.ground_lines import GroundHeight, contour_lines
@@ -38,9 +38,7 @@ _BESIDE_M = 0.015
 
 def robot_rgb(robot: str) -> Rgb:
     """Return the colour that a robot's path, place and name have."""
-    number = robot.rpartition("_")[2]
-    place = (int(number) - 1) % len(FOLLOWER_COLOURS) if number.isdigit() else 0
-    red, green, blue = bytes.fromhex((LEADER_COLOUR if robot == names.LEADER else FOLLOWER_COLOURS[place])[1:])
+    red, green, blue = bytes.fromhex(robot_colour(robot)[1:])
     return red, green, blue
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from robot_formation.analysis.style import BAND, BLACK, U_COLOUR, V_COLOUR
-from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
+from robot_formation.analysis.figures import timestep_axis
+from robot_formation.analysis.style import BLACK, U_COLOUR, V_COLOUR
 from robot_formation.viewing.recorded_scene import RecordedScene
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 _CM = 100.0
 _LEAST_CM = 1.0
-_MOST_TICKS = 25
 _BARS: dict[str, Any] = {"width": 0.72, "edgecolor": "white", "linewidth": 0.5, "animated": True}
 
 
@@ -24,20 +23,14 @@ class TimestepPanel:
     """The panel; `artists` are what changes with time, in the order in which they are drawn."""
 
     def __init__(self, axes: Axes, scene: RecordedScene) -> None:
-        from matplotlib.ticker import MaxNLocator
-
         self._scene = scene
-        numbers = range(1, scene.timesteps + 1)
-        axes.axvspan(0.5, COLLECTION_TIMESTEPS + 0.5, color=BAND, zorder=0, linewidth=0)
+        timestep_axis(axes, scene.timesteps, label="")
         axes.text(0.6, 0.98, "collection", transform=axes.get_xaxis_transform(), va="top", fontsize=8, color="0.35")
-        axes.set(xlim=(0.5, scene.timesteps + 0.5), ylim=(0.0, 1.2 * self._highest_cm()))
-        axes.set(xlabel="timestep", ylabel="cm")
-        if scene.timesteps <= _MOST_TICKS:
-            axes.set_xticks(numbers)
-        else:
-            axes.xaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=True))
+        axes.set(xlabel="timestep", ylabel="cm", ylim=(0.0, 1.2 * self._highest_cm()))
         axes.grid(axis="y")
-        zeros = np.zeros(scene.timesteps)
+        # A bar for those that were begun only: a bag may plan any number.
+        numbers = range(1, min(scene.timesteps, scene.timesteps_with_moves) + 1)
+        zeros = np.zeros(len(numbers))
         self._v = axes.bar(numbers, zeros, color=V_COLOUR, label="correction v", **_BARS)
         self._u = axes.bar(numbers, zeros, color=U_COLOUR, hatch="////", label="correction u", **_BARS)
         (self._errors,) = axes.plot(
@@ -48,7 +41,7 @@ class TimestepPanel:
     def update(self, stamp_ns: int) -> None:
         """Show a time."""
         scene = self._scene
-        for timestep in range(1, min(scene.timesteps, scene.timesteps_with_moves) + 1):
+        for timestep in range(1, len(self._v.patches) + 1):
             done = scene.corrections(timestep, stamp_ns)
             self._v.patches[timestep - 1].set_height(done.v_m * _CM)
             self._u.patches[timestep - 1].set_y(done.v_m * _CM)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from robot_formation import names
 from robot_formation.bag.formation_bag import FormationBag
-from robot_formation.bag.odometry import Odometry
+from robot_formation.bag.odometry import Odometry, are_poses
 from robot_formation.names import Message
 from robot_formation.world.pose import Pose
 
@@ -25,7 +25,7 @@ class TruePoses:
     """
 
     def __init__(self, messages: Sequence[Message], period_ns: int) -> None:
-        """Take the poses out of nav_msgs/Odometry messages.
+        """Take the poses out of nav_msgs/Odometry messages; those that are none are left out.
 
         Args:
             messages: at least one.
@@ -39,12 +39,11 @@ class TruePoses:
             return
         poses = [message.pose.pose for message in messages]
         stamps = np.array([m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
+        positions = np.array([(p.position.x, p.position.y, p.position.z) for p in poses])
+        turns = np.array([(p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w) for p in poses])
         order = np.argsort(stamps, kind="stable")
-        self.stamps_ns = stamps[order]
-        self.positions_m = np.array([(p.position.x, p.position.y, p.position.z) for p in poses])[order]
-        self.orientations = np.array(
-            [(p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w) for p in poses]
-        )[order]
+        order = order[are_poses(positions, turns)[order]]
+        self.stamps_ns, self.positions_m, self.orientations = stamps[order], positions[order], turns[order]
 
     def at(self, stamp_ns: int) -> Pose:
         """Return the pose at a stamp: between two poses of a motion on the line between them, else the last one.
@@ -93,4 +92,5 @@ def true_poses(bag: FormationBag, robots: Sequence[str], period_ns: int) -> dict
     messages: dict[str, list[Message]] = defaultdict(list)
     for message in bag.messages(there):
         messages[topics[message.topic]].append(message.message)
-    return {robot: TruePoses(found, period_ns) for robot, found in messages.items()}
+    poses = {robot: TruePoses(found, period_ns) for robot, found in messages.items()}
+    return {robot: found for robot, found in poses.items() if len(found.stamps_ns)}

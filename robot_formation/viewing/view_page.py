@@ -15,6 +15,7 @@ import numpy as np
 
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.json_values import JsonObject
+from robot_formation.system.files import check_writable, write_whole
 from robot_formation.viewing.browser import ViewError, view_server
 from robot_formation.viewing.moment import FollowerNow, Picture
 from robot_formation.viewing.page_template import PAGE
@@ -48,15 +49,19 @@ def write_page(path: Path, bag: FormationBag, run: RunMoments, warn: Callable[[s
         ViewError: viser is missing, the file can't be written, or the page would be too large.
         BagError: the bag is corrupted.
     """
-    text = make_page(bag, run, warn).encode("utf-8")
+    try:
+        check_writable(path)  # the page takes a while
+        return _write_page(path, make_page(bag, run, warn).encode("utf-8"))
+    except OSError as error:
+        raise ViewError(f"{path} can't be written ({error.strerror or error}); choose another place") from error
+
+
+def _write_page(path: Path, text: bytes) -> int:
     if len(text) > MOST_BYTES:
         raise ViewError(
             f"the page would have {len(text) / 1e6:.1f} MB, more than {MOST_BYTES / 1e6:g} MB; nothing was written"
         )
-    try:
-        path.write_bytes(text)
-    except OSError as error:
-        raise ViewError(f"{path} can't be written ({error.strerror}); choose another place") from error
+    write_whole(path, text)
     return len(text)
 
 

@@ -28,7 +28,7 @@ def seconds(time_s: float) -> int:
     return round(1e9 * time_s)
 
 
-def track(x_m: float, moves: list[tuple[float, float]], end_s: float, lean: float = 0.0) -> Track:
+def track(x_m: float, moves: list[tuple[float, float]], end_s: float, tilt: float = 0.0) -> Track:
     """A robot at x_m that looks along y: it begins moves of some lengths at some times, and is silent else.
 
     Each takes a second, and half of its way is driven in the last quarter of that.
@@ -45,7 +45,7 @@ def track(x_m: float, moves: list[tuple[float, float]], end_s: float, lean: floa
     ys.append(ys[-1])
     count = len(stamps)
     positions = np.column_stack([np.full(count, x_m), ys, np.zeros(count)])
-    return Track(np.array(stamps), positions, np.full(count, 0.5 * math.pi), np.tile([lean, 0.0], (count, 1)))
+    return Track(np.array(stamps), positions, np.full(count, 0.5 * math.pi), np.tile([tilt, 0.0], (count, 1)))
 
 
 def totals(
@@ -122,12 +122,12 @@ def test_without_a_report_there_is_no_error_but_there_are_gaps() -> None:
     }
 
 
-def test_robots_that_lean_towards_each_other_are_nearer_at_their_tops() -> None:
-    tracks = {"leader": track(1.0, [], 5.0, lean=0.05), "follower_1": track(1.32, [], 5.0, lean=-0.03)}
+def test_robots_tilted_towards_each_other_are_nearer_at_their_tops() -> None:
+    tracks = {"leader": track(1.0, [], 5.0, tilt=0.05), "follower_1": track(1.32, [], 5.0, tilt=-0.03)}
     follower = FollowerRecord("follower_1")
     run = RunRecord((), (follower,), tracks, details={"parameters": '{"world": {"chassis.body_top_m": 0.2}}'})
     assert motion_totals(run, follower)["gap_min_m"] == pytest.approx(0.32 - 0.238 - 0.2 * 0.08)
-    away = {"leader": track(1.0, [], 5.0, lean=-0.05), "follower_1": track(1.32, [], 5.0, lean=0.03)}
+    away = {"leader": track(1.0, [], 5.0, tilt=-0.05), "follower_1": track(1.32, [], 5.0, tilt=0.03)}
     assert motion_totals(RunRecord((), (follower,), away), follower)["gap_min_m"] == pytest.approx(0.32 - 0.238)
 
 
@@ -153,7 +153,7 @@ def test_touches_are_counted_once_until_the_bodies_are_apart_again(gaps: list[fl
 
 
 def test_a_bag_and_a_run_in_memory_have_the_same_totals(tmp_path: Path) -> None:
-    """Leaning bodies, places of an echelon and all else: whatever way the messages have come."""
+    """Tilted bodies, places of an echelon and all else: whatever way the messages have come."""
     settings = ["formation=echelon", "start_y_m=0.3", "leader.timesteps=3", "world.camera.mode=on_demand"]
     scenario = override(load_track("one"), settings)
     in_memory = analyse(run_in_memory(scenario)).followers[0].totals

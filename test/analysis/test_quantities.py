@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robot_formation.analysis.errors import AnalysisError
-from robot_formation.analysis.from_bag import load_run
+from robot_formation.analysis.from_bag import load_run, read_ground
 from robot_formation.analysis.quantities import RunAnalysis, analyse, corrections_of
 from robot_formation.analysis.report import to_json
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped, Track
@@ -19,7 +19,7 @@ from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.writer import BagWriter
 from robot_formation.geometry.se2 import Motion
-from synthetic_bag import STEPS, Step, SyntheticRun, write_run
+from synthetic_bag import STEPS, Step, SyntheticRun, surface_marker, write_run
 
 ROW_KEYS = [
     "t",
@@ -246,6 +246,14 @@ def test_a_topic_of_another_type_is_refused(tmp_path: Path) -> None:
         writer.write("/follower_1/moved", b"\x00\x01\x00\x00\x01\x00\x00\x00\x00", 0)
     with pytest.raises(BagError, match="PoseWithCovarianceStamped is needed"):
         load_run(tmp_path / "run")
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, 1e300])
+def test_a_ground_with_a_corner_that_is_no_place_is_none(wrong: float) -> None:
+    marker = surface_marker(cells=2)
+    assert read_ground(marker) is not None
+    marker.points[3].z = wrong
+    assert read_ground(marker) is None
 
 
 def test_the_ground_comes_from_the_surface_marker(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from robot_formation import conversions, names
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.odometry import Odometry, _columns
 from robot_formation.bag.reader import read_bag
+from robot_formation.geometry.orientation import Quaternion
 
 TOPIC = names.ground_truth_odom(names.LEADER).of()
 
@@ -17,9 +18,9 @@ def recorded() -> list[bytes]:
         return [raw.cdr for raw in FormationBag(bag).raw_messages([TOPIC])]
 
 
-def one(child: str, x_m: float, stamp_ns: int) -> bytes:
+def one(child: str, x_m: float, stamp_ns: int, turn: Quaternion = (0.0, 0.6, 0.0, 0.8)) -> bytes:
     message = conversions.body_odometry(
-        (x_m, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.0,) * 3, (0.0,) * 3, frame="world", child=child, stamp_ns=stamp_ns
+        (x_m, 2.0, 3.0), turn, (0.0,) * 3, (0.0,) * 3, frame="world", child=child, stamp_ns=stamp_ns
     )
     return conversions.to_cdr(message)
 
@@ -57,6 +58,20 @@ def test_a_message_that_is_cut_off_is_an_error() -> None:
     whole = one("a", 1.0, 5)
     with pytest.raises(Exception, match=r".+"):
         Odometry([whole[:60]])
+
+
+@pytest.mark.parametrize("child", ["a", "longer"])
+def test_what_is_no_pose_is_left_out(child: str) -> None:
+    good = [one("a", 1.0, 5), one(child, 1.5, 9)]
+    nan = float("nan")
+    bad = [one("a", nan, 6), one("a", float("inf"), 6), one("a", 1e300, 6), one("a", 1.0, 6, (0.0, 0.0, 0.0, 0.0))]
+    bad += [one("a", 1.0, 6, (0.0, 0.0, 0.0, nan)), one("a", 1.0, 6, (0.0, 0.0, 0.0, 2.0))]
+    found = Odometry([good[0], *bad, good[1]])
+    assert found.stamps_ns.tolist() == [5, 9]
+    assert found.positions_m[:, 0].tolist() == [1.0, 1.5]
+    assert [message.pose.pose.position.x for message in found] == [1.0, 1.5]
+    assert found.orientations.shape == (2, 4)
+    assert len(Odometry(bad)) == 0
 
 
 def test_stamps_and_poses_are_numbers_of_their_types() -> None:

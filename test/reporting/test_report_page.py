@@ -21,7 +21,7 @@ from robot_formation.experiment.sweep import read_sweep
 from robot_formation.reporting.citation import bibtex
 from robot_formation.reporting.inline_svg import inlined
 from robot_formation.reporting.markup import element, fill, page_text, section
-from robot_formation.reporting.page import PageSpace, write_page
+from robot_formation.reporting.page import PageError, PageSpace, write_page
 from robot_formation.reporting.report import default_path, report_page
 from robot_formation.reporting.runs import load_runs
 from robot_formation.reporting.sweep_sections import repeating_command
@@ -215,7 +215,22 @@ def test_the_page_goes_where_told_or_to_its_source(capsys: pytest.CaptureFixture
     assert Reader((sweep / "report.html").read_text(encoding="utf-8")).headings[0] == "Sweep: sweep"
     assert default_path([tmp_path / "a"]) == tmp_path / "a_analysis" / "report.html"
     assert default_path([tmp_path / "a", sweep]) == tmp_path / "a_analysis" / "comparison.html"
-    assert write_page("page", tmp_path / "new" / "page.html").read_text() == "page"
+    assert write_page(lambda: "page", tmp_path / "new" / "page.html").read_text() == "page"
+
+
+def test_a_place_that_can_not_be_written_is_told_before_the_work_and_an_older_page_stays(tmp_path: Path) -> None:
+    def work() -> str:
+        raise KeyboardInterrupt
+
+    (tmp_path / "page.html").write_text("older")
+    for place in ("page.html/page.html", "page.html/new/page.html", "."):
+        with pytest.raises(PageError, match="can't be written"):
+            write_page(work, tmp_path / place)
+    for place in ("page.html", "new/folder/page.html"):
+        with pytest.raises(KeyboardInterrupt):
+            write_page(work, tmp_path / place)
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+    assert (tmp_path / "page.html").read_text() == "older"
 
 
 def test_a_sweeps_page_tells_its_summary_by_track_path_and_surface(tmp_path: Path) -> None:

@@ -53,3 +53,12 @@ def test_opposite_quaternions_are_the_same_orientation() -> None:
     turned.z, turned.w = -turned.z, -turned.w
     half = TruePoses(messages, PERIOD_NS).at(PERIOD_NS // 2).orientation
     assert np.allclose(half, quaternion(0.0, 0.0, 0.2))
+
+
+def test_what_is_no_pose_is_left_out() -> None:
+    messages = [odometry(stamp_ns, x, 0.0, 0.1) for stamp_ns, x in ((0, 1.0), (1, math.nan), (2, math.inf), (3, 2.0))]
+    turned = messages[3].pose.pose.orientation
+    turned.z = turned.w = 0.0
+    poses = TruePoses(messages, PERIOD_NS)
+    assert poses.stamps_ns.tolist() == [0]
+    assert poses.at(3).position == (1.0, 0.0, 0.0)

@@ -7,7 +7,7 @@ import pytest
 
 from robot_formation.cli.main import make_parser
 from robot_formation.cli.run import build_scenario
-from robot_formation.experiment.scenario import Scenario, load_track, override
+from robot_formation.experiment.scenario import Scenario, load, load_track, override, presets
 from robot_formation.launching.processes import run_metadata
 from robot_formation.reporting.changed_parameters import ChangedParameter, changed_parameters
 from robot_formation.reporting.repetition import repetition
@@ -38,6 +38,40 @@ def test_the_command_makes_the_same_scenario(track: str, settings: list[str]) ->
     assert found.missed == ()
     assert repeated(found.command).by_node() == run.by_node()
     assert repeated(found.command).setup == run.setup
+
+
+@pytest.mark.parametrize("preset", list(presets()))
+def test_the_command_makes_each_preset_again_with_blackouts_and_pushes(preset: str) -> None:
+    run = load(presets()[preset])
+    last = run.robots[-1]
+    blackouts = f"blackouts=[[5, 2], [follower_1, 9, 1], [{last}, 11, 2]]"
+    assert_repeated(override(run, [blackouts, f"pushes=[[{last}, 8, 0.03, 0.0], [leader, 3, 0.0, -0.012]]"]))
+
+
+def test_the_command_gives_each_follower_its_place() -> None:
+    start = ["start_x_m=0.6", "start_y_m=0.3", "leader.timesteps=8"]
+    assert_repeated(override(load_track("two"), [*start, "followers=2", "slots=[[0.32, -0.05], [0.33, -0.02]]"]))
+
+
+def assert_repeated(run: Scenario) -> None:
+    found = repetition(run_metadata(run))
+    assert found is not None
+    assert found.missed == ()
+    again = repeated(found.command)
+    assert again.by_node() == run.by_node()
+    assert again.slots == run.slots
+    for robot in run.robots[1:]:
+        assert again.setup.blackouts_of(robot) == run.setup.blackouts_of(robot)
+
+
+def test_one_refused_parameter_keeps_no_other_from_the_command() -> None:
+    details = run_metadata(override(load_track("two"), ["predictor.forgetting=0.9"]))
+    nodes = json.loads(details["parameters"])
+    nodes["drive"]["wheel_speed_rad_s"] = "fast"
+    found = repetition({**details, "parameters": json.dumps(nodes)})
+    assert found is not None
+    assert found.missed == ("drive.wheel_speed_rad_s",)
+    assert found.command == "formation run --track two --set predictor.forgetting=0.9"
 
 
 def test_a_parameter_that_is_gone_is_named() -> None:
