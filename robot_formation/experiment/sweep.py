@@ -167,13 +167,12 @@ def _check_track(name: str) -> None:
 
 
 def _check_predictor(name: str) -> None:
-    if name not in IDEAL:
-        check_predictor_name(name)
+    check_predictor_name(name, IDEAL)
 
 
 def _check_path(name: str) -> None:
     if name == Teleop.name:
-        raise SweepError(f"path '{name}' is driven by a person; a sweep takes others")
+        raise SweepError(f"no path '{name}' in a sweep: a person drives it")
     check_path_name(name)
 
 
