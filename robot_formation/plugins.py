@@ -26,6 +26,9 @@ GROUPS: Mapping[str, str] = MappingProxyType(
 )
 """Entry-point group of each kind of class that can be added."""
 
+FAILURES = (Exception, SystemExit)
+"""What a class from outside may raise, whatever it does; an interrupt is the user's."""
+
 _CLASS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
 
@@ -101,7 +104,7 @@ def load(kind: str, name: str) -> type:
         raise PluginError(f"{subject}: no module '{error.name}'{hint}") from error
     except AttributeError:
         raise PluginError(f"{subject}: module '{module}' has no '{attribute}'") from None
-    except Exception as error:  # whatever the module does when it is imported
+    except FAILURES as error:  # whatever the module does when it is imported
         raise PluginError(f"{subject}: can't be imported: {_told(error)}") from error
     if not isinstance(found, type):
         raise PluginError(f"{subject}: '{value}' is no class")
@@ -133,7 +136,7 @@ def completed(kind: str, name: str, found: type, *, needs: str, base: type, memb
         options = {"init": not makes_itself, "frozen": not makes_itself, "eq": not makes_itself}
         made: type[Any] = dataclasses.dataclass(**options)(type(found.__name__, parts, own))
         made()
-    except Exception as error:  # whatever a class of somebody else's raises
+    except FAILURES as error:
         raise failed(kind, name, "making one without arguments", error) from error
     return made
 
@@ -143,12 +146,23 @@ def has_constructor(found: type) -> bool:
     return not dataclasses.is_dataclass(found) and found.__init__ is not object.__init__  # type: ignore[misc]
 
 
-def failed(kind: str, name: str, what: str, error: Exception) -> PluginError:
+@contextmanager
+def guarded(kind: str, name: str, what: str) -> Iterator[None]:
+    """Turn whatever a class from outside raises into a PluginError that says what failed."""
+    try:
+        yield
+    except PluginError:
+        raise
+    except FAILURES as error:
+        raise failed(kind, name, what, error) from error
+
+
+def failed(kind: str, name: str, what: str, error: BaseException) -> PluginError:
     """Make the error of a class from outside that failed at something, in one line."""
     return PluginError(f"{kind} '{name}': {what} failed: {_told(error)}")
 
 
-def _told(error: Exception) -> str:
+def _told(error: BaseException) -> str:
     lines = str(error).strip().splitlines()
     return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__
 
