@@ -17,9 +17,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
-from robot_formation.parameters import ParameterError, suggestion
+from robot_formation.json_values import Json
+from robot_formation.parameters import ParameterError, from_mapping, suggestion
+
+T = TypeVar("T")
 
 GROUPS: Mapping[str, str] = MappingProxyType(
     {kind: f"robot_formation.{kind}s" for kind in ("predictor", "surface", "path", "sensor")}
@@ -98,17 +101,24 @@ def load(kind: str, name: str) -> type:
     module, _, attribute = value.partition(":")
     try:
         with _working_directory():
-            found = getattr(importlib.import_module(module), attribute.strip())
+            found = getattr(importlib.import_module(module), attribute.strip(), None)
     except ModuleNotFoundError as error:
-        hint = "" if plugin else "; modules are looked for among the installed ones and in the working directory"
-        raise PluginError(f"{subject}: no module '{error.name}'{hint}") from error
-    except AttributeError:
-        raise PluginError(f"{subject}: module '{module}' has no '{attribute}'") from None
+        raise PluginError(f"{subject}: {_missing(str(error.name), module, packaged=plugin is not None)}") from error
     except FAILURES as error:  # whatever the module does when it is imported
         raise PluginError(f"{subject}: can't be imported: {_told(error)}") from error
+    if found is None:
+        raise PluginError(f"{subject}: module '{module}' has no '{attribute}'")
     if not isinstance(found, type):
         raise PluginError(f"{subject}: '{value}' is no class")
     return found
+
+
+def _missing(name: str, module: str, *, packaged: bool) -> str:
+    """Explain a missing module: the class's own, or one that its module imports."""
+    if not f"{module}.".startswith(f"{name}."):
+        return f"can't be imported: it needs the module '{name}', which is not installed"
+    hint = "" if packaged else "; modules are looked for among the installed ones and in the working directory"
+    return f"no module '{name}'{hint}"
 
 
 def completed(kind: str, name: str, found: type, *, needs: str, base: type, members: Mapping[str, object]) -> type[Any]:
@@ -129,6 +139,10 @@ def completed(kind: str, name: str, found: type, *, needs: str, base: type, memb
     """
     if not callable(getattr(found, needs, None)):
         raise PluginError(f"{kind} '{name}': it has no method '{needs}'; see docs/how-to/extend.md")
+    if dataclasses.is_dataclass(found) and not found.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+        raise PluginError(
+            f"{kind} '{name}': write @dataclass(frozen=True), so that its parameters can't change in a run"
+        )
     parts = (found,) if issubclass(found, base) else (found, base)
     own = {"name": name, "__doc__": found.__doc__ or f"A {kind} from outside the package.", **members}
     try:
@@ -139,6 +153,20 @@ def completed(kind: str, name: str, found: type, *, needs: str, base: type, memb
     except FAILURES as error:
         raise failed(kind, name, "making one without arguments", error) from error
     return made
+
+
+def build(kind: str, name: str, found: type[T], values: Mapping[str, Json]) -> T:
+    """Make one of a class from outside, with values for its parameters.
+
+    Raises:
+        ParameterError: on an unknown parameter or a value that can't be used, also if the class itself refuses it.
+    """
+    try:
+        return from_mapping(found, values, where=f"{kind} '{name}'")
+    except ParameterError:
+        raise
+    except FAILURES as error:
+        raise failed(kind, name, "making one", error) from error
 
 
 def has_constructor(found: type) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from robot_formation import plugins
 from robot_formation.errors import shown
 from robot_formation.json_values import Json
-from robot_formation.parameters import ParameterError, from_mapping, parameter
+from robot_formation.parameters import parameter
 from robot_formation.surface.base import PLATE_SIZE_M, GradientNormal, Surface
 
 KIND = "surface"
@@ -57,13 +57,7 @@ def make_outside_surface(name: str, parameters: Mapping[str, Json]) -> Surface:
     Raises:
         ParameterError: on an unknown parameter, or a value that the class or this package refuses.
     """
-    kind = outside_surface(name)
-    try:
-        surface: Surface = from_mapping(kind, parameters, where=f"{KIND} '{name}'")
-    except ParameterError:
-        raise
-    except plugins.FAILURES as error:
-        raise plugins.failed(KIND, name, "making one", error) from error
+    surface: Surface = plugins.build(KIND, name, outside_surface(name), parameters)
     check_size(name, surface)
     return surface
 
