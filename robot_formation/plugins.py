@@ -33,6 +33,7 @@ FAILURES = (Exception, SystemExit)
 """What a class from outside may raise, whatever it does; an interrupt is the user's."""
 
 _CLASS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
+_SUBJECT = re.compile(r"\w+ '[^']*'")
 
 
 class PluginError(ParameterError):
@@ -172,6 +173,13 @@ def build(kind: str, name: str, found: type[T], values: Mapping[str, Json]) -> T
 def has_constructor(found: type) -> bool:
     """Whether a class from outside has a constructor of its own, other than a dataclass's."""
     return not dataclasses.is_dataclass(found) and found.__init__ is not object.__init__  # type: ignore[misc]
+
+
+def subject(error: PluginError) -> str:
+    """Return whose error it is: the kind and name of the class, with which its text begins."""
+    text = str(error)
+    match = _SUBJECT.match(text)
+    return match[0] if match else text
 
 
 @contextmanager
