@@ -17,16 +17,23 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
-from robot_formation.parameters import ParameterError, suggestion
+from robot_formation.json_values import Json
+from robot_formation.parameters import ParameterError, from_mapping, suggestion
+
+T = TypeVar("T")
 
 GROUPS: Mapping[str, str] = MappingProxyType(
     {kind: f"robot_formation.{kind}s" for kind in ("predictor", "surface", "path", "sensor")}
 )
 """Entry-point group of each kind of class that can be added."""
 
+FAILURES = (Exception, SystemExit)
+"""What a class from outside may raise, whatever it does; an interrupt is the user's."""
+
 _CLASS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
+_SUBJECT = re.compile(r"\w+ '[^']*'")
 
 
 class PluginError(ParameterError):
@@ -95,17 +102,24 @@ def load(kind: str, name: str) -> type:
     module, _, attribute = value.partition(":")
     try:
         with _working_directory():
-            found = getattr(importlib.import_module(module), attribute.strip())
+            found = getattr(importlib.import_module(module), attribute.strip(), None)
     except ModuleNotFoundError as error:
-        hint = "" if plugin else "; modules are looked for among the installed ones and in the working directory"
-        raise PluginError(f"{subject}: no module '{error.name}'{hint}") from error
-    except AttributeError:
-        raise PluginError(f"{subject}: module '{module}' has no '{attribute}'") from None
-    except Exception as error:  # whatever the module does when it is imported
+        raise PluginError(f"{subject}: {_missing(str(error.name), module, packaged=plugin is not None)}") from error
+    except FAILURES as error:  # whatever the module does when it is imported
         raise PluginError(f"{subject}: can't be imported: {_told(error)}") from error
+    if found is None:
+        raise PluginError(f"{subject}: module '{module}' has no '{attribute}'")
     if not isinstance(found, type):
         raise PluginError(f"{subject}: '{value}' is no class")
     return found
+
+
+def _missing(name: str, module: str, *, packaged: bool) -> str:
+    """Explain a missing module: the class's own, or one that its module imports."""
+    if not f"{module}.".startswith(f"{name}."):
+        return f"can't be imported: it needs the module '{name}', which is not installed"
+    hint = "" if packaged else "; modules are looked for among the installed ones and in the working directory"
+    return f"no module '{name}'{hint}"
 
 
 def completed(kind: str, name: str, found: type, *, needs: str, base: type, members: Mapping[str, object]) -> type[Any]:
@@ -126,6 +140,10 @@ def completed(kind: str, name: str, found: type, *, needs: str, base: type, memb
     """
     if not callable(getattr(found, needs, None)):
         raise PluginError(f"{kind} '{name}': it has no method '{needs}'; see docs/how-to/extend.md")
+    if dataclasses.is_dataclass(found) and not found.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+        raise PluginError(
+            f"{kind} '{name}': write @dataclass(frozen=True), so that its parameters can't change in a run"
+        )
     parts = (found,) if issubclass(found, base) else (found, base)
     own = {"name": name, "__doc__": found.__doc__ or f"A {kind} from outside the package.", **members}
     try:
@@ -133,9 +151,23 @@ def completed(kind: str, name: str, found: type, *, needs: str, base: type, memb
         options = {"init": not makes_itself, "frozen": not makes_itself, "eq": not makes_itself}
         made: type[Any] = dataclasses.dataclass(**options)(type(found.__name__, parts, own))
         made()
-    except Exception as error:  # whatever a class of somebody else's raises
+    except FAILURES as error:
         raise failed(kind, name, "making one without arguments", error) from error
     return made
+
+
+def build(kind: str, name: str, found: type[T], values: Mapping[str, Json]) -> T:
+    """Make one of a class from outside, with values for its parameters.
+
+    Raises:
+        ParameterError: on an unknown parameter or a value that can't be used, also if the class itself refuses it.
+    """
+    try:
+        return from_mapping(found, values, where=f"{kind} '{name}'")
+    except ParameterError:
+        raise
+    except FAILURES as error:
+        raise failed(kind, name, "making one", error) from error
 
 
 def has_constructor(found: type) -> bool:
@@ -143,12 +175,30 @@ def has_constructor(found: type) -> bool:
     return not dataclasses.is_dataclass(found) and found.__init__ is not object.__init__  # type: ignore[misc]
 
 
-def failed(kind: str, name: str, what: str, error: Exception) -> PluginError:
+def subject(error: PluginError) -> str:
+    """Return whose error it is: the kind and name of the class, with which its text begins."""
+    text = str(error)
+    match = _SUBJECT.match(text)
+    return match[0] if match else text
+
+
+@contextmanager
+def guarded(kind: str, name: str, what: str) -> Iterator[None]:
+    """Turn whatever a class from outside raises into a PluginError that says what failed."""
+    try:
+        yield
+    except PluginError:
+        raise
+    except FAILURES as error:
+        raise failed(kind, name, what, error) from error
+
+
+def failed(kind: str, name: str, what: str, error: BaseException) -> PluginError:
     """Make the error of a class from outside that failed at something, in one line."""
     return PluginError(f"{kind} '{name}': {what} failed: {_told(error)}")
 
 
-def _told(error: Exception) -> str:
+def _told(error: BaseException) -> str:
     lines = str(error).strip().splitlines()
     return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__
 

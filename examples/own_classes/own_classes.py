@@ -65,7 +65,7 @@ class Hsv:
         found = []
         for signature, hue in self.hues:
             distance = np.abs((hsv[:, :, 0].astype(int) - hue + 90) % 180 - 90)
-            mask = ((distance < 12) & (hsv[:, :, 1] > 120) & (hsv[:, :, 2] > 50)).astype(np.uint8)
+            mask = ((distance < 12) & (hsv[:, :, 1] > 190) & (hsv[:, :, 2] > 50)).astype(np.uint8)
             count, _, stats, _ = cv2.connectedComponentsWithStats(mask)
             if count > 1:
                 left, top, width, height, area = stats[1 + stats[1:, cv2.CC_STAT_AREA].argmax()].tolist()

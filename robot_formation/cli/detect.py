@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robot_formation.cli.messages import say
-from robot_formation.cli.option_types import positive_whole
+from robot_formation.cli.option_types import positive_whole, quoted
 from robot_formation.cli.parser import Subparsers
 from robot_formation.errors import FormationError
 from robot_formation.json_values import JsonObject
@@ -25,6 +25,7 @@ Each image is taken by itself (shown twice, with block filtering 0), or, with --
 sequence, with tracking.
 """
 _FRAME_US = 16_200
+_DEFAULT_SENSOR = "colours"
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -34,7 +35,11 @@ def add_parser(subparsers: Subparsers) -> None:
         "images", metavar="IMAGE", type=Path, nargs="+", help="image file, 316 x 208 (others are scaled)"
     )
     parser.add_argument(
-        "--sensor", metavar="NAME", default="colours", help="colours (default), tags, or see 'formation list sensors'"
+        "--sensor",
+        metavar="NAME",
+        type=_sensor,
+        default=_DEFAULT_SENSOR,
+        help=f"{_DEFAULT_SENSOR} (default), tags, or see 'formation list sensors'",
     )
     parser.add_argument(
         "--signatures", metavar="FILE", type=Path, help="taught signatures, YAML or JSON; needed for colours"
@@ -92,19 +97,28 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _detector(sensor: str, signatures: Path | None, parameters: DetectorParameters) -> BlockSensor:
+def _sensor(name: str) -> str:
+    """Take the name of a sensor; its class is not imported for it."""
+    if name == _DEFAULT_SENSOR:  # nothing has to be imported for it
+        return name
     from robot_formation.parameters import suggestion
+    from robot_formation.vision.sensors import SENSORS, is_outside_sensor
+
+    if name in SENSORS or is_outside_sensor(name):
+        return name
+    raise argparse.ArgumentTypeError(f"can't be {quoted(name)}{suggestion(name, SENSORS)}")
+
+
+def _detector(sensor: str, signatures: Path | None, parameters: DetectorParameters) -> BlockSensor:
     from robot_formation.vision.aruco_detector import TagDetector
     from robot_formation.vision.pixy2.detector import BlockDetector
     from robot_formation.vision.pixy2.signatures import load_signatures
-    from robot_formation.vision.sensors import SENSORS, is_outside_sensor, outside_sensor
+    from robot_formation.vision.sensors import is_outside_sensor, outside_sensor
 
     if is_outside_sensor(sensor):
         return outside_sensor(sensor, parameters)
     if sensor == "tags":
         return TagDetector(tracking=parameters)
-    if sensor not in SENSORS:
-        raise FormationError(f"--sensor: can't be '{sensor}'{suggestion(sensor, SENSORS)}")
     if signatures is None:
         raise FormationError("colours need --signatures FILE with what 'formation teach' has taught, or --sensor tags")
     return BlockDetector(load_signatures(signatures), parameters)

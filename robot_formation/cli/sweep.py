@@ -37,6 +37,7 @@ PICTURE_NAME = "corrections"
 FEW_SEEDS = 5
 """Of n seeds, the whole range of values covers the median with a probability of 1 - 2**(1 - n): 94 % for five."""
 MOST_SEEDS = 1_000_000
+_REMEDY = "the same command with this --out goes on, also without what failed"
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -110,6 +111,11 @@ def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
         try:
             for row in with_progress(rows, len(tasks)):
                 results.add(row)
+        except sweep.FailedRunsError as error:
+            for line in error.lines:
+                print(f"formation sweep: {line}", file=sys.stderr)
+            print(f"formation sweep: {len(results.rows)} runs are in {folder}; {_REMEDY}", file=sys.stderr)
+            return exit_codes.BAD_INPUT
         except KeyboardInterrupt:
             print(f"\nformation sweep: interrupted; the same command with --out {folder} goes on", file=sys.stderr)
             return exit_codes.INTERRUPTED

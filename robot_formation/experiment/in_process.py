@@ -25,6 +25,7 @@ from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult, joined_reasons
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import IMAGE_TYPE, Message, Topic, absolute
+from robot_formation.plugins import PluginError
 from robot_formation.schedule.schedules import Spacing
 
 P = TypeVar("P")
@@ -135,7 +136,8 @@ def run_in_process(
 ) -> RunResult:
     """Run a scenario, record it if a path is given, and tell its progress to `say`.
 
-    A reservation of the bag's path may have been taken already; it is released at the end.
+    A reservation of the bag's path may have been taken already; it is released at the end. If a class from outside the
+    package fails after the start, the run ends as if its node had died: what was recorded until then stays.
 
     Raises:
         FormationError: if a component refuses its parameters, or the bag's path is taken or can't be written.
@@ -157,7 +159,7 @@ def run_in_process(
             stack.callback(run.recorder.close)
         try:
             code, reason = run.run()
-        except RunError as error:
+        except (RunError, PluginError) as error:
             code, reason = exit_codes.NODE_DIED, str(error)
         except KeyboardInterrupt:
             code, reason = exit_codes.INTERRUPTED, "interrupted"

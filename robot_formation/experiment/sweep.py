@@ -11,8 +11,9 @@ from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from robot_formation import plugins
 from robot_formation.analysis.conditions import conditions
 from robot_formation.analysis.quantities import analyse
 from robot_formation.batch.pool import run_parallel
@@ -24,10 +25,11 @@ from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.noise_floor import IDEAL, IdealRun
 from robot_formation.experiment.path_plan import STRAIGHT
 from robot_formation.json_values import JsonObject
-from robot_formation.koopman.predictors import check_predictor_name
+from robot_formation.koopman.predictors import NAMES, Predictor, PredictorParameters, check_predictor_name
 from robot_formation.leader.paths import Teleop, check_path_name
 from robot_formation.names import Message
 from robot_formation.parameters import ParameterError, suggestion
+from robot_formation.plugins import PluginError
 from robot_formation.surface import check_surface_name
 
 # The comparison's common ground unless --set says otherwise: the paper's fine-tuner, pictures only when waited for.
@@ -39,6 +41,33 @@ _GOES_ON = "the same command with the same --out goes on"
 
 class SweepError(FormationError):
     """A sweep can't be planned, or its folder can't be used."""
+
+
+class Failure(NamedTuple):
+    """A run that a class from outside the package has ended: which class, and the run with what was wrong."""
+
+    subject: str
+    text: str
+
+
+class FailedRunsError(SweepError):
+    """Runs that classes from outside the package have ended; all others of the sweep were done.
+
+    Attributes:
+        lines: one for each such class: its first failed run, and how many others failed.
+    """
+
+    def __init__(self, failures: Sequence[Failure]) -> None:
+        """Take at least one failure."""
+        texts: dict[str, list[str]] = {}
+        for failure in failures:
+            texts.setdefault(failure.subject, []).append(failure.text)
+        self.lines = [_with_others(found[0], len(found) - 1) for found in texts.values()]
+        super().__init__("; ".join(self.lines))
+
+
+def _with_others(text: str, others: int) -> str:
+    return f"{text} ({others} more of its runs failed)" if others else text
 
 
 class Task(NamedTuple):
@@ -167,13 +196,14 @@ def _check_track(name: str) -> None:
 
 
 def _check_predictor(name: str) -> None:
-    if name not in IDEAL:
-        check_predictor_name(name)
+    check_predictor_name(name, IDEAL)
+    if name not in (*NAMES, *IDEAL):
+        Predictor(PredictorParameters(name=name))  # imported and made before anything is run
 
 
 def _check_path(name: str) -> None:
     if name == Teleop.name:
-        raise SweepError(f"path '{name}' is driven by a person; a sweep takes others")
+        raise SweepError(f"no path '{name}' in a sweep: a person drives it")
     check_path_name(name)
 
 
@@ -195,7 +225,8 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
     """Carry out one run.
 
     Raises:
-        SweepError: if the scenario can't be run to an end; the text names the run.
+        PluginError: if a class from outside the package fails; the text names the run.
+        SweepError: if the scenario can't be run to an end for another reason; so does it.
     """
 
     def make_run(scenario: scenarios.Scenario, listen: Callable[[str, Message], None]) -> InProcessRun:
@@ -208,6 +239,8 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
     except FormationError as error:
         path = "" if task.path == STRAIGHT else f", path {task.path}"
         run = f"track {task.track}{path}, surface {task.surface}, predictor {task.predictor}, seed {task.seed}"
+        if isinstance(error, PluginError):
+            raise PluginError(f"{error} ({run})") from None
         raise SweepError(f"{run}: {error}") from None
     totals = analysis.followers[0].totals
     # A sum of nothing is an integer 0, which the table would give back as another text.
@@ -220,6 +253,26 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
         timesteps=totals["timesteps_finished"],
         **quantities,
     )
+
+
+def _attempt(run: Callable[[Task, Sequence[str]], Row], task: Task, settings: Sequence[str]) -> Row | Failure:
+    """Carry out one run; a class from outside that fails doesn't stop the others."""
+    try:
+        return run(task, settings)
+    except PluginError as error:
+        return Failure(plugins.subject(error), str(error))
+
+
+def _rows(results: Iterable[Row | Failure]) -> Iterator[Row]:
+    """Yield the rows, and raise FailedRunsError at the end if some runs gave none."""
+    failures = []
+    for result in results:
+        if isinstance(result, Failure):
+            failures.append(result)
+        else:
+            yield result
+    if failures:
+        raise FailedRunsError(failures)
 
 
 class Table:
@@ -315,10 +368,11 @@ def carry_out(tasks: Iterable[Task], settings: Sequence[str], jobs: int) -> Iter
     """Run tasks on this machine's cores by joblib; yield rows in the order of the tasks, each as soon as it is there.
 
     Raises:
-        SweepError: if a run can't come to its end, or a worker process dies.
+        FailedRunsError: when all others are done, if a class from outside the package failed in some.
+        SweepError: if a run can't come to its end for another reason, or a worker process dies.
     """
     try:
-        yield from run_parallel(run_task, ((task, settings) for task in tasks), jobs)
+        yield from _rows(run_parallel(_attempt, ((run_task, task, settings) for task in tasks), jobs))
     except BrokenExecutor:
         raise SweepError(f"a worker process died (too little memory for --jobs {jobs}?); {_GOES_ON}") from None
 
@@ -327,6 +381,7 @@ def carry_out_by_dask(tasks: Iterable[Task], settings: Sequence[str], scheduler:
     """Run tasks on a Dask cluster; yield rows as they come.
 
     Raises:
+        FailedRunsError: when all others are done, if a class from outside the package failed in some.
         SweepError: if Dask isn't installed, the scheduler doesn't answer or goes away, or a run can't be done there.
     """
     try:
@@ -341,12 +396,22 @@ def carry_out_by_dask(tasks: Iterable[Task], settings: Sequence[str], scheduler:
         reason = str(error).partition("\n")[0] or type(error).__name__
         raise SweepError(f"no Dask scheduler answers at {scheduler}: {reason}") from None
     with client:
-        for future in as_completed(client.map(partial(run_task, settings=settings), list(tasks), pure=False)):
-            if future.cancelled():
-                raise SweepError(f"the Dask cluster at {scheduler} is gone; {_GOES_ON}")
-            problem = future.exception()
-            if isinstance(problem, FormationError):
-                raise problem
-            if problem is not None:
-                raise SweepError(f"a Dask worker can't do the runs: {type(problem).__name__}: {problem}; {_GOES_ON}")
-            yield future.result()
+        futures = client.map(partial(_attempt, run_task, settings=settings), list(tasks), pure=False)
+        yield from _rows(_result(future, scheduler) for future in as_completed(futures))
+
+
+def _result(future: Any, scheduler: str) -> Row | Failure:
+    """Return what a Dask worker has found.
+
+    Raises:
+        SweepError: if it has found nothing.
+    """
+    if future.cancelled():
+        raise SweepError(f"the Dask cluster at {scheduler} is gone; {_GOES_ON}")
+    problem = future.exception()
+    if isinstance(problem, FormationError):
+        raise problem
+    if problem is not None:
+        raise SweepError(f"a Dask worker can't do the runs: {type(problem).__name__}: {problem}; {_GOES_ON}")
+    result: Row | Failure = future.result()
+    return result

@@ -21,7 +21,7 @@ from robot_formation.surface.elliptic_bowl import EllipticBowl
 from robot_formation.surface.gaussian_bump import GaussianBump
 from robot_formation.surface.heightmap import Heightmap
 from robot_formation.surface.inclined_plane import InclinedPlane
-from robot_formation.surface.outside import outside_surface
+from robot_formation.surface.outside import make_outside_surface, outside_surface
 from robot_formation.surface.plane import Plane
 from robot_formation.surface.ripple import Ripple
 from robot_formation.surface.saddle import Saddle
@@ -61,7 +61,10 @@ def make_surface(name: str, parameters: Mapping[str, Json] = MappingProxyType({}
     Raises:
         ParameterError: on an unknown name or parameter, with the nearest known one, or a value out of range.
     """
-    surface: Surface = from_mapping(_kind(name), parameters, where=f"surface '{name}'")
+    kind = _kind(name)
+    if name not in SURFACES:
+        return make_outside_surface(name, parameters)
+    surface: Surface = from_mapping(kind, parameters, where=f"surface '{name}'")
     return surface
 
 
@@ -76,16 +79,16 @@ def surface_from_texts(name: str, texts: Sequence[str]) -> Surface:
 
 
 def plate_size(name: str, texts: Sequence[str] = ()) -> float:
-    """Return the edge of a surface's plate, metres, without building the surface.
+    """Return the edge of a surface's plate, metres, without building the surface if it is one of the package's own.
 
     Raises:
         ParameterError: as `surface_from_texts`, as far as names and texts go.
     """
     kind = _kind(name)
     values = read_texts(kind, texts, where=f"surface '{name}'", example="size_m=2.0")
-    spec = specs(kind).get("size_m")
-    if spec is None:  # of a class from outside that has no parameters
-        return float(make_surface(name).size_m)
+    if name not in SURFACES:  # a class from outside may find its size in other ways than by a parameter
+        return float(make_surface(name, values).size_m)
+    spec = specs(kind)["size_m"]
     return float(typing.cast(float, check(spec, values.get("size_m", spec.default), where=f"surface '{name}'")))
 
 

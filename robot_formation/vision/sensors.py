@@ -46,10 +46,8 @@ class OutsideSensor:
         Raises:
             PluginError: if the class fails, or returns no blocks.
         """
-        try:
+        with plugins.guarded(KIND, self._name, "detect"):
             boxes = _boxes(self._made.detect(checked(picture)))
-        except Exception as error:  # whatever a class of somebody else's raises
-            raise plugins.failed(KIND, self._name, "detect", error) from error
         reported = self._tracker.step(boxes, time_us)
         return limited(reported, ALL_SIGNATURES, len(reported))
 
@@ -95,10 +93,8 @@ def made_sensor(name: str, kind: type, tracking: DetectorParameters) -> BlockSen
 def _make(name: str, kind: type) -> Any:
     if not any(callable(getattr(kind, method, None)) for method in ("detect", "process")):
         raise plugins.PluginError(f"{KIND} '{name}': it has no method 'detect'; see docs/how-to/extend.md")
-    try:
+    with plugins.guarded(KIND, name, "making one without arguments"):
         return kind()
-    except Exception as error:  # whatever a class of somebody else's raises
-        raise plugins.failed(KIND, name, "making one without arguments", error) from error
 
 
 def _boxes(found: Iterable[Iterable[float]]) -> list[Box]:

@@ -23,7 +23,7 @@ def ended(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Cap
         (("rnu",), "formation", "no verb 'rnu'; did you mean 'run'?"),
         (("RUN",), "formation", "no verb 'RUN'; did you mean 'run'?"),
         (("help",), "formation", "did you mean 'formation --help'?"),
-        (("",), "formation", "no verb ''; there are: analyze, calibrate, "),
+        (("",), "formation", "no verb ''; there are: analyze, animate, calibrate, "),
         (("run", "--sed", "3"), "formation run", "no option '--sed'; did you mean '--seed'?"),
         (("run", "-seed", "3"), "formation run", "no option '-seed'; did you mean '--seed'?"),
         (("run", "--sed=3"), "formation run", "no option '--sed'; did you mean '--seed'?"),

@@ -207,7 +207,7 @@ def test_a_tag_detector_reads_no_signatures(tmp_path: Path) -> None:
 def test_the_scenarios_marker_sets_the_world_the_sensor_and_the_calibration() -> None:
     scenario = override(load_track("two"), ["marker=tags"])
     scenario.check()
-    assert scenario.world.marker.kind is scenario.block_detector.sensor is MarkerKind.TAGS
+    assert scenario.world.marker.kind == scenario.block_detector.sensor == MarkerKind.TAGS
     assert scenario.fine_tuner.alignment.side_bias_px != 2.65
     assert scenario.drive == load_track("two").drive
     assert override(scenario, ["marker=colours"]) == load_track("two")

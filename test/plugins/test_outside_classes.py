@@ -1,7 +1,8 @@
 """Classes from outside the package, by 'module:Class': what they need, what they may leave out, what is wrong."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,11 @@ from robot_formation.geometry.se2 import Motion
 from robot_formation.koopman.predictors import PredictionError, Predictor, PredictorParameters
 from robot_formation.koopman.predictors.outside import OutsideModel
 from robot_formation.leader.paths import make_path
+from robot_formation.leader.paths.base import Given
+from robot_formation.leader.paths.outside import completed_path
 from robot_formation.parameters import ParameterError
 from robot_formation.surface import make_surface, plate_size, surface_from_texts
+from robot_formation.surface.outside import completed_surface
 from robot_formation.testing import check_path, check_predictor, check_sensor, check_surface
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.sensors import made_sensor
@@ -168,9 +172,23 @@ def test_a_predictor_in_the_working_directory_runs_also_with_its_residual_closed
     [
         ("", "mine:Mine", "module 'mine' has no 'Mine'"),
         ("Mine = 3\n", "mine:Mine", "is no class"),
-        ("import nowhere_at_all\n", "mine:Mine", "no module 'nowhere_at_all'"),
+        (
+            "import nowhere_at_all\n",
+            "mine:Mine",
+            "can't be imported: it needs the module 'nowhere_at_all', which is not installed",
+        ),
+        ("import email.nowhere_at_all\n", "mine:Mine", "it needs the module 'email.nowhere_at_all', which is not"),
+        ("import sys\nsys.exit(7)\n", "mine:Mine", "can't be imported: SystemExit: 7"),
+        ("[].argv\n", "mine:Mine", "can't be imported: AttributeError: 'list' object has no"),
+        ("Mine = None\n", "mine:Mine", "module 'mine' has no 'Mine'"),
         ("raise ValueError('not\\ntoday')\n", "mine:Mine", "can't be imported: ValueError: not"),
         ("", "yours:Mine", "no module 'yours'; modules are looked for among the installed ones and in the working"),
+        ("", "email.yours:Mine", "no module 'email.yours'; modules are looked for"),
+        (
+            "class Mine:\n    def __init__(self):\n        exit(7)\n    observe = forecast = exit\n",
+            "mine:Mine",
+            "SystemExit: 7",
+        ),
     ],
 )
 def test_a_class_that_cant_be_loaded_is_told_in_one_line(module: Path, text: str, name: str, says: str) -> None:
@@ -303,3 +321,53 @@ def test_a_sensor_needs_blocks_of_a_picture_only() -> None:
         check_sensor(Fifth)
     with pytest.raises(AssertionError, match="sensor 'Words': detect failed: ValueError"):
         check_sensor(Words)
+
+
+@dataclass
+class Thawed:
+    step_m: float = 0.05
+
+    def motion(self, timestep: int) -> tuple[float, float]:
+        return self.step_m, 0.0
+
+    def height(self, x: float, y: float) -> float:
+        return self.step_m
+
+
+@pytest.mark.parametrize(("kind", "completed"), [("path", completed_path), ("surface", completed_surface)])
+def test_a_dataclass_whose_parameters_can_change_is_refused(kind: str, completed: Callable[[str, type], type]) -> None:
+    says = rf"^{kind} 'mine': write @dataclass\(frozen=True\), so that its parameters can't change in a run$"
+    with pytest.raises(plugins.PluginError, match=says):
+        completed("mine", Thawed)
+
+
+@dataclass(frozen=True)
+class Picky:
+    step_m: float = 0.05
+    sides: int = 4
+
+    def __post_init__(self) -> None:
+        if self.sides == 3:
+            raise ArithmeticError("three sides")
+
+    def motion(self, timestep: int) -> tuple[float, float]:
+        return self.step_m, 0.0
+
+    def prepared(self, given: Given) -> "Picky":
+        return {4: self}[self.sides]
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("sides=3", "making one failed: ArithmeticError: three sides"),
+        ("sides=5", "'prepared' failed: KeyError: 5"),
+        ("sids=5", "did you mean 'sides'"),
+    ],
+)
+def test_a_value_that_a_path_itself_refuses_is_told(text: str, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plugins, "load", lambda kind, name: Picky)
+    name = f"{__name__}:Picky"
+    assert make_path(name).motion(1) == Motion(0.05)
+    with pytest.raises(ParameterError, match=says):
+        make_path(name, [text])

@@ -105,10 +105,8 @@ class OutsideModel:
             self.observe(x)
 
     def _call(self, what: str, function: Callable[..., Any], *arguments: object) -> Any:
-        try:
+        with plugins.guarded(KIND, self._name, what):
             return function(*arguments)
-        except Exception as error:  # whatever a class of somebody else's raises
-            raise plugins.failed(KIND, self._name, what, error) from error
 
 
 def _takes_an_argument(function: Callable[..., Any]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from robot_formation import plugins
@@ -19,14 +20,19 @@ def is_outside_predictor(name: str) -> bool:
     return plugins.may_be(name.removesuffix(CLOSE), "predictor")
 
 
-def check_predictor_name(name: str) -> None:
+def check_predictor_name(name: str, also: Iterable[str] = ()) -> None:
     """Check a predictor's name; a class from outside is not imported for it.
+
+    Args:
+        name: to be checked.
+        also: further names that may be used.
 
     Raises:
         PluginError: with the nearest known name.
     """
-    if name not in NAMES and not is_outside_predictor(name):
-        raise plugins.unknown("predictor", name, NAMES)
+    known = (*NAMES, *also)
+    if name not in known and not is_outside_predictor(name):
+        raise plugins.unknown("predictor", name, known)
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,10 @@ def make_path(name: str, texts: Sequence[str] = (), given: Given = _NOTHING) -> 
         values.setdefault("step_m", given.step_m)
     if "phase" in known:
         values.setdefault("phase", float(given.random("phase").random()))
+    if name not in PATHS:
+        outside = plugins.build("path", name, kind, values)
+        with plugins.guarded("path", name, "'prepared'"):
+            return outside.prepared(given)
     made = from_mapping(kind, values, where=where)
     if isinstance(made, Switch):
         return made.joined(given, of_parts, make_path)

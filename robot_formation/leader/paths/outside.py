@@ -38,7 +38,7 @@ def completed_path(name: str, kind: type[Any]) -> type[PathKind]:
         try:
             found = kind.motion(self, timestep)
             motion = found if isinstance(found, Motion) else Motion(*(float(part) for part in found))
-        except Exception as error:  # whatever a class of somebody else's raises
+        except plugins.FAILURES as error:
             raise plugins.failed(KIND, name, f"the motion of timestep {timestep}", error) from error
         if not motion.finite:
             raise plugins.PluginError(f"{KIND} '{name}': the motion of timestep {timestep} is not finite")

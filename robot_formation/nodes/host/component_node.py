@@ -147,6 +147,7 @@ class Host:
         self._transforms = LiveTransforms(node.get_namespace()) if self._transform_topics else None
         self._publishers: dict[names.Topic, Message] = {}
         self._heard_s = time.monotonic()
+        self._failure: FormationError | None = None
         self._connect()
 
     def _connect(self) -> None:
@@ -197,6 +198,8 @@ class Host:
                 idle_s = _HELD_BACK_S if outbox.waiting else _IDLE_S
                 with contextlib.suppress(ExternalShutdownException):
                     executor.spin_once(min(self._pacer.left_s, idle_s) if busy else idle_s)
+                if self._failure is not None:
+                    raise self._failure
                 ready = component.busy and not outbox.waiting and component.exit_code is None
                 if ready and self._pacer.left_s <= 0.0:
                     component.work()
@@ -224,7 +227,10 @@ class Host:
     def _heard(self, handler: Handler) -> Handler:
         def noted(message: Message) -> None:
             self._heard_s = time.monotonic()
-            handler(message)
+            try:
+                handler(message)
+            except FormationError as error:  # raised by `run`: the executor would log it in several lines of its own
+                self._failure = error
 
         return noted
 
