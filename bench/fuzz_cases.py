@@ -192,7 +192,7 @@ def scenario_texts() -> list[str]:
 def parameter_names() -> list[str]:
     """All names that --set takes."""
     from robot_formation.components import catalogue
-    from robot_formation.experiment.scenario import Setup
+    from robot_formation.experiment.scenario_setup import Setup
     from robot_formation.parameters import specs
 
     return [

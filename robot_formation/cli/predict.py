@@ -133,7 +133,8 @@ def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[Predictor
     Raises:
         FormationError: naming what is misspelt, out of range or of another node.
     """
-    from robot_formation.experiment.scenario import Setup, build, override
+    from robot_formation.experiment.scenario import build, override
+    from robot_formation.experiment.scenario_setup import Setup
     from robot_formation.koopman.predictors import NAMES, check_predictor_name
     from robot_formation.parameters import ParameterError
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from robot_formation import names
 from robot_formation.calibration.camera_check import check_camera
 from robot_formation.calibration.drive_check import check_curves
 from robot_formation.components.catalogue import KINDS, NodeKind
@@ -20,8 +19,8 @@ from robot_formation.components.node_parameters import (
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
 from robot_formation.experiment.chain_defaults import backdrop, unchecked_headings
-from robot_formation.experiment.disturbances import blackouts_of, pushes_of
-from robot_formation.experiment.formations import ABREAST, FORMATIONS, slots_of, starts_of
+from robot_formation.experiment.disturbances import pushes_of
+from robot_formation.experiment.formations import slots_of, starts_of
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
 from robot_formation.experiment.overhead_defaults import (
     overhead_calibrations,
@@ -37,125 +36,31 @@ from robot_formation.experiment.path_plan import (
     prediction_bounds,
     with_room,
 )
+from robot_formation.experiment.scenario_setup import FOLLOWS_FROM_SETUP, START, Setup
 from robot_formation.follower.blind_driving import blind_timesteps
 from robot_formation.follower.fine_tuning import AlignmentModeName
 from robot_formation.geometry.slots import Slots, leader_places
 from robot_formation.koopman.predictors import Predictor, PredictorParameters
 from robot_formation.leader.leader_motion import LeaderParameters
 from robot_formation.parameters import (
-    LENGTH_PAIRS,
-    ROWS,
     ParameterError,
     check_as,
     flatten,
     from_mapping,
-    parameter,
     specs,
     suggestion,
     to_mapping,
 )
 from robot_formation.paths import config_dir
-from robot_formation.schedule.schedules import Schedule, Spacing, check_spacing
+from robot_formation.schedule.schedules import Spacing
 from robot_formation.surface import check_surface_name, plate_size
 from robot_formation.surface.base import PLATE_SIZE_M
 from robot_formation.system.yaml_files import YamlError, parse_yaml
-from robot_formation.vision.marker import MarkerKind
 from robot_formation.vision.sensors import find_sensor, is_outside_sensor
 
 P = TypeVar("P")
 Settings = Mapping[str, Mapping[str, object]]
 """Parameters that differ from the defaults: by node, then by dotted name."""
-
-
-START = ("start_x_m", "start_y_m")
-
-FOLLOWS_FROM_SETUP = {
-    "world": {
-        "marker.kind": "'marker'",
-        "seed": "'seed'",
-        "robots": "'followers'",
-        "start_x_m": "'start_x_m' of the scenario",
-        "start_y_m": "'start_y_m' of the scenario",
-        "start_heading_rad": "'heading_deg' of the scenario",
-        "schedule": "'schedule' of the scenario",
-        "timesteps": "'leader.timesteps'",
-        "period_s": "'leader.period_s'",
-        "pushes": "'pushes' of the scenario",
-    },
-    "block_detector": {"sensor": "'marker'"},
-    "leader": {
-        "followers": "'followers'",
-        "seed": "'seed'",
-        "room_m": "the plate's size",
-        "schedule": "'schedule' of the scenario",
-    },
-    "fine_tuner": {
-        "done_listeners": "'followers'",
-        "formation_ahead_m": "'formation' or 'slots' of the scenario",
-        "blackouts": "'blackouts' of the scenario",
-        "schedule": "'schedule' of the scenario",
-        "spacing": "'spacing' of the scenario",
-        "timesteps": "'leader.timesteps'",
-        "period_s": "'leader.period_s'",
-    },
-}
-"""Parameters of nodes that follow from the setup, and what is set instead."""
-
-
-_START = "not given, a path other than straight starts so that all of it lies in the plate's middle"
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What a scenario says beside the nodes' parameters."""
-
-    name: str = parameter("", "Name shown in reports")
-    seed: int = parameter(0, "Seed of every random stream", low=0, high=2**63 - 1)
-    followers: int = parameter(1, "Number of followers, each beside the one before", low=1, high=10)
-    schedule: Schedule = parameter(Schedule.TURNS, "Who waits for whom before a timestep begins")
-    spacing: Spacing = parameter(
-        Spacing.RIGID,
-        "What a follower's place is: beside its neighbour, or (delayed) where that was one timestep earlier",
-    )
-    formation: str = parameter(
-        ABREAST, "Where the followers' places are; echelon: each a little behind the one before", known=FORMATIONS
-    )
-    slots: LENGTH_PAIRS = parameter(
-        (),
-        "Places of one's own in place of 'formation', each from the robot on the left: pairs of distance to the right "
-        "and offset ahead (negative: behind), like [[0.32, -0.05]], one for each follower or one for all",
-        unit="m",
-        low=-2.0,
-        high=2.0,
-    )
-    start_x_m: float = parameter(0.763, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
-    start_y_m: float = parameter(0.158, f"Start of the leader; {_START}", unit="m", low=-10.0, high=100.0)
-    heading_deg: float = parameter(90.0, "Heading of the formation", unit="deg", low=-360.0, high=360.0)
-    marker: MarkerKind = parameter(MarkerKind.COLOURS, "What the robots' markers carry and their cameras look for")
-    blackouts: ROWS = parameter(
-        (), "Timesteps without cameras: [first timestep, length] for all, [follower_2, first timestep, length] for one"
-    )
-    pushes: ROWS = parameter(
-        (),
-        "Pushes, each as [robot, timestep, metres ahead, metres to the left]: when the leader's move of the timestep "
-        "has ended, the robot is displaced without turning its wheels",
-    )
-
-    def __post_init__(self) -> None:
-        """Check that blackouts and pushes are such, and that the spacing fits the schedule."""
-        for robot in self.robots:
-            self.blackouts_of(robot)
-        pushes_of(self.pushes)
-        check_spacing(self.schedule, self.spacing)
-
-    @property
-    def robots(self) -> list[str]:
-        """Names of the robots, the leader first."""
-        return [names.LEADER, *(names.follower(n) for n in range(1, self.followers + 1))]
-
-    def blackouts_of(self, robot: str = "") -> tuple[int, ...]:
-        """List first timesteps and lengths of a follower's blackouts, as its fine-tuner has them; '': those of all."""
-        return blackouts_of(self.blackouts, self.robots, robot)
 
 
 @dataclass(frozen=True)

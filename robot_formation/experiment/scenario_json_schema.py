@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from robot_formation.components.catalogue import KINDS
-from robot_formation.experiment.scenario import FOLLOWS_FROM_SETUP, Setup
+from robot_formation.experiment.scenario_setup import FOLLOWS_FROM_SETUP, Setup
 from robot_formation.parameters import LENGTH_PAIRS, LIST_ELEMENTS, ROWS, Spec, specs
 
 _TYPES: dict[object, dict[str, object]] = {

@@ -13,7 +13,8 @@ from robot_formation.bag.run_details import mapping, node_parameters, said_slots
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
-from robot_formation.experiment.scenario import FOLLOWS_FROM_SETUP, Scenario
+from robot_formation.experiment.scenario import Scenario
+from robot_formation.experiment.scenario_setup import FOLLOWS_FROM_SETUP
 from robot_formation.json_values import Json, JsonObject
 from robot_formation.parameters import to_mapping
 from robot_formation.world.pushes import read_push

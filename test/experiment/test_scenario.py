@@ -17,7 +17,6 @@ from robot_formation.experiment import node_defaults as module
 from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.experiment.scenario import (
     Scenario,
-    Setup,
     load,
     load_track,
     override,
@@ -27,6 +26,7 @@ from robot_formation.experiment.scenario import (
     with_surface,
 )
 from robot_formation.experiment.scenario_json_schema import scenario_schema
+from robot_formation.experiment.scenario_setup import Setup
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M
 from robot_formation.koopman.predictors import NAMES, PredictorParameters
 from robot_formation.parameters import from_mapping, specs, to_mapping
