@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robot_formation.schedule.schedules import Schedule
+from robot_formation.schedule.schedules import Schedule, Spacing
 
-_BACKDROP = {"marker.backdrop_m": 0.16}
+_DARK = {"marker.backdrop_rgb": (12, 12, 13)}
+"""With delayed spacing a look is at a robot that stands ahead, whose Rear face shows as a narrow strip: before a light
+board that is a block now and then, and chains of ten were lost."""
+_BACKDROP: dict[str, object] = {"marker.backdrop_m": 0.16}
 """Boards behind the markers of a chain: without them a follower sees its neighbour's neighbour's marker beside its
 neighbour's as soon as they don't stand in a row, and takes both for one that is nearer. Hides 8 cm per robot."""
 _NO_HEADING_CHECKS = {
@@ -16,9 +19,10 @@ _NO_HEADING_CHECKS = {
 }
 
 
-def backdrop(followers: int, own: Mapping[str, object]) -> dict[str, float]:
+def backdrop(followers: int, spacing: Spacing, own: Mapping[str, object]) -> dict[str, object]:
     """Return the world's parameters of a chain's markers, apart from those that are set."""
-    return {name: value for name, value in _BACKDROP.items() if followers > 1 and name not in own}
+    found = {**_BACKDROP, **(_DARK if spacing is Spacing.DELAYED else {})}
+    return {name: value for name, value in found.items() if followers > 1 and name not in own}
 
 
 def unchecked_headings(schedule: Schedule, own: Mapping[str, object]) -> dict[str, float]:

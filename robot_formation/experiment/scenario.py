@@ -229,7 +229,7 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
         "robots": setup.robots,
         "pushes": [push.text for push in pushes_of(setup.pushes)],
         **starts_of(setup.start_x_m, setup.start_y_m, setup.heading_deg, slots),
-        **backdrop(setup.followers, own),
+        **backdrop(setup.followers, setup.spacing, own),
         **overhead_camera(size_m, own),
     }
     world = made(WorldNodeParameters, "world", **timed, **follows)

@@ -23,11 +23,11 @@ from robot_formation.schedule.schedules import COLLECTION_TIMESTEPS
 from robot_formation.schedule.start_rule import StartRule
 from robot_formation.vision.pixy2.block import Block
 
-_STILL_FRAMES, _STILL_PX = 20, 2
-"""A robot stands still if its blocks have stayed within so many pixels for so many frames (at 5 cm/s: 14 px).
-
-Ten frames are too few: so long a neighbour may stand between the legs of a move along v and u.
-"""
+_STILL_FRAMES, _STILL_PX = 10, 2
+"""A robot stands still if its blocks have stayed within so many pixels for so many frames (at 5 cm/s: 7 px)."""
+_STILL_FRAMES_WITHOUT_MOVE = 20
+"""The same for a follower that stands itself while its neighbour moves: so long as not to take the pause between the
+legs of that move for its end."""
 _MORE_EXTENSIONS = 12
 """Extensions of a look at a robot that moves: up to four seconds at 30 frames per second."""
 _UNTOLD = (0.01**2, 0.0, 0.0, 0.0, 0.01**2, 0.0, 0.0, 0.0, 0.02**2)
@@ -400,9 +400,10 @@ class FineTuner:
 
     def _still(self) -> bool:
         """Whether the neighbour seems to stand: its blocks are where they were some frames ago."""
-        if len(self._frames) < _STILL_FRAMES:
+        frames = _STILL_FRAMES if self._displacement != Motion() else _STILL_FRAMES_WITHOUT_MOVE
+        if len(self._frames) < frames:
             return False
-        before, now = ({block.signature: block for block in self._frames[at]} for at in (-_STILL_FRAMES, -1))
+        before, now = ({block.signature: block for block in self._frames[at]} for at in (-frames, -1))
         return all(
             abs(before[face].x - now[face].x) <= _STILL_PX and abs(before[face].height - now[face].height) <= _STILL_PX
             for face in before.keys() & now.keys()
