@@ -20,10 +20,9 @@ from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.experiment.scenario_json_schema import scenario_schema
-from robot_formation.nodes.followed_run import FollowedRunParameters
 from robot_formation.nodes.host.ros_parameters import AT_START, HostParameters, reasons
 from robot_formation.nodes.player.player_node import PlayerNode, PlayerParameters
-from robot_formation.nodes.progress.progress_node import ProgressExecutable
+from robot_formation.nodes.progress.progress_node import ProgressExecutable, ProgressParameters
 from robot_formation.nodes.recorder.recorder_node import RecorderNode, RecorderParameters
 from robot_formation.nodes.viewer.viewer_node import ViewerExecutable, ViewerParameters
 from robot_formation.parameters import Spec, specs
@@ -50,7 +49,7 @@ def parameter_classes() -> dict[str, type]:
     others: dict[str, type] = {
         "recorder": RecorderParameters,
         "player": PlayerParameters,
-        "progress": FollowedRunParameters,
+        "progress": ProgressParameters,
         "viewer": ViewerParameters,
     }
     return {**classes, **others, COMMON: HostParameters}

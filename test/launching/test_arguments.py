@@ -55,7 +55,7 @@ def test_a_preset_is_found_by_name_and_the_schedule_has_an_argument() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "says"),
     [
-        ("scenario", "line_of_six", "formation list scenarios"),
+        ("scenario", "line_of_six", "no scenario file or preset 'line_of_six'; did you mean 'line_of_"),
         ("schedule", "waves", "schedule:= can't be 'waves'"),
         ("predictor", "foo", "predictor:= can't be 'foo'"),
         ("seed", "x", "seed:="),

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import pytest
 
 from robot_formation.components.catalogue import KINDS
-from robot_formation.nodes.followed_run import FollowedRunParameters
 from robot_formation.nodes.host.ros_parameters import HostParameters
 from robot_formation.nodes.player.player_node import PlayerParameters
+from robot_formation.nodes.progress.progress_node import ProgressParameters
 from robot_formation.nodes.recorder.recorder_node import RecorderParameters
 from robot_formation.nodes.viewer.viewer_node import ViewerParameters
 from robot_formation.parameters import specs
@@ -17,7 +17,7 @@ NODES: dict[str, tuple[type, ...]] = {
     **{kind: (entry.parameter_class(), HostParameters) for kind, entry in KINDS.items()},
     "recorder": (RecorderParameters, HostParameters),
     "player": (PlayerParameters,),
-    "progress": (FollowedRunParameters,),
+    "progress": (ProgressParameters,),
     "viewer": (ViewerParameters,),
 }
 

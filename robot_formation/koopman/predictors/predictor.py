@@ -34,8 +34,16 @@ from robot_formation.koopman.predictors.models import (
     vector,
 )
 from robot_formation.koopman.predictors.outside import OutsideModel
-from robot_formation.koopman.predictors.parameters import CLOSABLE, CLOSE, TREND_CLOSE, PredictorParameters
+from robot_formation.koopman.predictors.parameters import (
+    CLOSABLE,
+    CLOSE,
+    NAMES,
+    TREND_CLOSE,
+    PredictorParameters,
+    is_outside_predictor,
+)
 from robot_formation.koopman.predictors.spatial import Spatial, after, between, ways
+from robot_formation.parameters import suggestion
 
 # Nothing moves or is measured so finely: what is less is rounding, and dividing by it makes no sense.
 _FINEST_M = 1e-9
@@ -107,6 +115,8 @@ class Predictor:
     def __init__(self, parameters: PredictorParameters) -> None:
         self.parameters = parameters
         name = parameters.name
+        if name not in NAMES and not is_outside_predictor(name):
+            raise PredictionError(f"no predictor '{name}'{suggestion(name, NAMES)}")
         inner = name.removesuffix(CLOSE)
         self._closing: Closing | MixedExperts | None = None
         if name in EXPERTS:

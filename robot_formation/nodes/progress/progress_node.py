@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar
 
@@ -24,13 +25,18 @@ _ROUND_S = 0.03
 _QUIET_ROUNDS, _MOST_ROUNDS = 4, 60
 
 
+@dataclass(frozen=True)
+class ProgressParameters(FollowedRunParameters):
+    """What is followed."""
+
+
 class ProgressExecutable:
     """Prints one line per timestep and follower on standard output, until a signal comes."""
 
     fixed: ClassVar[Mapping[str, str]] = {"*": "it decides on topics and lines; start another one"}
 
     def __init__(self, node: ParameterNode) -> None:
-        (parameters,) = declare(node, FollowedRunParameters, fixed=self.fixed)
+        (parameters,) = declare(node, ProgressParameters, fixed=self.fixed)
         self._node = node
         self._messages = 0
         began = time.monotonic()
