@@ -42,7 +42,7 @@ from robot_formation.nodes.host.ros_parameters import (
     refuse_unused_overrides,
     take_changes,
 )
-from robot_formation.nodes.host.signals import ignore_signals, stopped
+from robot_formation.nodes.host.signals import bounded_end, ignore_signals, stopped
 from robot_formation.parameters import specs
 
 _IDLE_S = 0.1  # how often an idle node looks for signals
@@ -102,9 +102,10 @@ def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
         print(f"{name}: {str(error).splitlines()[0]}", file=sys.stderr)
         return exit_codes.BAD_INPUT
     finally:
-        if node is not None:
-            node.destroy_node()
-        try_shutdown()
+        with bounded_end():
+            if node is not None:
+                node.destroy_node()
+            try_shutdown()
         ignore_signals()
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import sys
+from collections.abc import Iterator
 
 from robot_formation import exit_codes
 from robot_formation.network.shared_memory_space import SharedMemoryError, require_space
 from robot_formation.system.signal_handling import ENDING, SignalCounter
 
+_LONGEST_END_S = 20
+"""Longer than a launcher waits before it kills (15 s)."""
 _signals = SignalCounter()
 
 
@@ -31,6 +35,21 @@ def ignore_signals() -> None:
     """
     for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
+
+
+@contextlib.contextmanager
+def bounded_end(longest_s: int = _LONGEST_END_S) -> Iterator[None]:
+    """Let the kernel end this process if what is inside takes longer than so many seconds.
+
+    Fast DDS sometimes never returns from destroying a node, at full load and with Python's lock held, so that no signal
+    handler runs any more. A node whose launcher is gone has nobody who would kill it then.
+    """
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.alarm(longest_s)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
 
 
 def stopped() -> bool:
