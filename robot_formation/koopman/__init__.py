@@ -17,6 +17,8 @@ from robot_formation.koopman.linear_algebra import KoopmanError, Regularization
 from robot_formation.koopman.online_dmd import OnlineDMD
 from robot_formation.koopman.quality import EigenvalueQuality, consistency_index, eigenvalue_qualities
 from robot_formation.koopman.radial_basis import RadialBasis
+from robot_formation.koopman.regressor import KoopmanRegressor, NotFittedError
+from robot_formation.koopman.samples import shift_episodes
 from robot_formation.koopman.spectrum import Spectrum, spectrum
 from robot_formation.koopman.windowed_dmd import WindowedDMD
 
@@ -31,7 +33,9 @@ __all__ = [
     "Identity",
     "Inputs",
     "KoopmanError",
+    "KoopmanRegressor",
     "Monomials",
+    "NotFittedError",
     "Observables",
     "OnlineDMD",
     "Product",
@@ -42,5 +46,6 @@ __all__ = [
     "WindowedDMD",
     "consistency_index",
     "eigenvalue_qualities",
+    "shift_episodes",
     "spectrum",
 ]

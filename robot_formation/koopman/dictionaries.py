@@ -1,7 +1,8 @@
 """Dictionaries: vectors Psi of observables psi_1, ..., psi_k of a state, the functions that K acts on.
 
 Convention of the paper ("Koopman operator theory and EDMD"): columns are snapshots, so a dictionary maps states X of
-shape (n, m) to Psi(X) of shape (k, m). Dictionaries are put together with `+` (`Concatenation`) and `*` (`Product`):
+shape (n, m) to Psi(X) of shape (k, m). `KoopmanRegressor` alone has them in rows, as scikit-learn does. Dictionaries
+are put together with `+` (`Concatenation`) and `*` (`Product`), and print as they are written:
 
     Identity(2) + Constant(2) + Monomials([(2, 0)])     observables x1, x2, 1, x1^2
 
@@ -23,6 +24,7 @@ from robot_formation.koopman.linear_algebra import KoopmanError, Matrix, as_matr
 
 # More observables than any laptop can decompose: a mistake in dimension or degree.
 _LARGEST_SIZE = 10_000
+_MOST_SHOWN = 8  # rows of exponents in a `repr`
 
 
 class Dictionary(Protocol):
@@ -49,7 +51,7 @@ class Dictionary(Protocol):
         """For each of the n components of the state the row of Psi that is it, None where there is none."""
 
     def __call__(self, X: ArrayLike) -> Matrix:
-        """Lift states (n, m) to observables (k, m - history).
+        """Lift states (n, m), one per column, to observables (k, m - history), one column per state.
 
         Raises:
             KoopmanError: on a wrong shape, a value that is not finite, or an observable that overflows.
@@ -112,6 +114,9 @@ class Observables(ABC):
     def _lift(self, X: Matrix) -> Matrix:
         """Lift finite states (n, m), m > history, to (k, m - history); overflow may pass, it is caught."""
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.dimension} variables: {self.size} observables>"
+
     def __add__(self, other: Dictionary) -> Concatenation:
         """Return the observables of both."""
         return Concatenation(self, other)
@@ -135,6 +140,9 @@ class Identity(Observables):
     def __init__(self, dimension: int, variables: Sequence[str] | None = None) -> None:
         super().__init__(dimension, _variables(dimension, variables), range(dimension))
 
+    def __repr__(self) -> str:
+        return f"Identity({self.dimension}{_named(self.names)})"
+
     def _lift(self, X: Matrix) -> Matrix:
         return np.array(X)
 
@@ -144,6 +152,9 @@ class Constant(Observables):
 
     def __init__(self, dimension: int) -> None:
         super().__init__(dimension, ["1"])
+
+    def __repr__(self) -> str:
+        return f"Constant({self.dimension})"
 
     def _lift(self, X: Matrix) -> Matrix:
         return np.ones((1, X.shape[1]))
@@ -171,6 +182,8 @@ class Monomials(Observables):
             [rows.index(unit) if unit in rows else None for unit in units],
         )
         self._exponents = table
+        shown = table.tolist() if len(table) <= _MOST_SHOWN else f"<{len(table)} rows of exponents>"
+        self._written = f"Monomials({shown}{_named(letters)})"
 
     @classmethod
     def to_degree(
@@ -196,11 +209,23 @@ class Monomials(Observables):
             for total in range(lowest, degree + 1)
             for chosen in combinations_with_replacement(range(dimension), total)
         ]
-        return cls(exponents, variables)
+        monomials = cls(exponents, variables)
+        from_degree = f", lowest={lowest}" if lowest != 1 else ""
+        named = _named(_variables(dimension, variables), "variables=")
+        monomials._written = f"Monomials.to_degree({dimension}, {degree}{from_degree}{named})"
+        return monomials
+
+    def __repr__(self) -> str:
+        return self._written
 
     def _lift(self, X: Matrix) -> Matrix:
         products: Matrix = np.prod(X[None, :, :] ** self._exponents[:, :, None], axis=1)
         return products
+
+
+def _named(letters: Sequence[str], keyword: str = "") -> str:
+    """Write names of variables as the last argument of a constructor; nothing if they are the usual ones."""
+    return "" if tuple(letters) == _variables(len(letters), None) else f", {keyword}{list(letters)}"
 
 
 def _monomial_name(powers: Sequence[int], letters: Sequence[str]) -> str:
@@ -227,6 +252,9 @@ class Rows(Observables):
         self._dictionary = dictionary
         self._rows = list(rows)
 
+    def __repr__(self) -> str:
+        return f"Rows({self._dictionary!r}, {self._rows}, {self.dimension})"
+
     def _lift(self, X: Matrix) -> Matrix:
         return self._dictionary(X[self._rows])
 
@@ -237,6 +265,11 @@ class Inputs(Rows):
     def __init__(self, states: int, inputs: int, variables: Sequence[str] | None = None) -> None:
         letters = [f"u{i + 1}" for i in range(inputs)] if variables is None else variables
         super().__init__(Identity(inputs, letters), range(states, states + inputs), states + inputs)
+        named = "" if variables is None else f", {list(variables)}"
+        self._written = f"Inputs({states}, {inputs}{named})"
+
+    def __repr__(self) -> str:
+        return self._written
 
 
 class DelayEmbedding(Observables):
@@ -265,8 +298,10 @@ class DelayEmbedding(Observables):
         """
         if delays < 0 or delays > _LARGEST_SIZE:
             raise KoopmanError(f"the number of delays must be between 0 and {_LARGEST_SIZE}, not {delays}")
+        inner = "" if dictionary is None else f", {dictionary!r}"
         if dictionary is None:
             letters = _variables(dimension, variables)
+            inner = _named(letters, "variables=")
             late = [f"{x}(t-{delay})" for delay in range(1, delays + 1) for x in letters]
             dictionary = Identity(dimension * (delays + 1), [*letters, *late])
         if dictionary.dimension != dimension * (delays + 1) or dictionary.history:
@@ -276,6 +311,10 @@ class DelayEmbedding(Observables):
             )
         super().__init__(dimension, dictionary.names, dictionary.state_rows[:dimension], delays)
         self._dictionary = dictionary
+        self._written = f"DelayEmbedding({dimension}, {delays}{inner})"
+
+    def __repr__(self) -> str:
+        return self._written
 
     def _lift(self, X: Matrix) -> Matrix:
         columns = X.shape[1] - self.history
@@ -298,6 +337,9 @@ class Concatenation(Observables):
         names = [name for part in parts for name in part.names]
         super().__init__(parts[0].dimension, names, rows, max(part.history for part in parts))
         self._parts = parts
+
+    def __repr__(self) -> str:
+        return " + ".join(map(repr, self._parts)) if len(self._parts) > 1 else f"Concatenation({self._parts[0]!r})"
 
     def _lift(self, X: Matrix) -> Matrix:
         return np.vstack([part(X[:, self.history - part.history :]) for part in self._parts])
@@ -322,6 +364,9 @@ class Product(Observables):
                 rows[i] = a * right.size + right.names.index("1")
         super().__init__(left.dimension, names, rows, max(left.history, right.history))
         self._left, self._right = left, right
+
+    def __repr__(self) -> str:
+        return " * ".join(f"({p!r})" if isinstance(p, Concatenation) else repr(p) for p in (self._left, self._right))
 
     def _lift(self, X: Matrix) -> Matrix:
         a, b = (part(X[:, self.history - part.history :]) for part in (self._left, self._right))

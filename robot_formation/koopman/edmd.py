@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +31,7 @@ from robot_formation.koopman.linear_algebra import (
     as_matrix,
     as_vector,
     check_finite,
+    check_time_step,
     solve,
 )
 from robot_formation.koopman.pairs import Pairs
@@ -47,6 +49,9 @@ class Errors:
 @dataclass(frozen=True, eq=False)
 class EDMD:
     """A fitted model Psi(y) = K Psi(x), or with inputs u Psi(y) = K Psi(x) + B Theta([x; u]).
+
+    Columns are snapshots, everywhere in this class: X has the shape (n, m). `KoopmanRegressor` is the same with
+    snapshots in rows, as scikit-learn, pykoop and pykoopman have them.
 
     Attributes:
         dictionary: Psi, of k observables of states of length n.
@@ -72,6 +77,13 @@ class EDMD:
     rank: int
     training_errors: Errors
 
+    def __repr__(self) -> str:
+        inputs = "" if self.input_dictionary is None else f", inputs={self.input_dictionary!r}"
+        return (
+            f"<EDMD of {self.dictionary!r}{inputs}: {self.dictionary.size} observables, rank {self.rank}, "
+            f"condition number {self.condition_number:.3g}, dt={self.dt:g}>"
+        )
+
     @classmethod
     def fit(
         cls,
@@ -89,8 +101,9 @@ class EDMD:
 
         Args:
             dictionary: Psi.
-            X: states (n, m). With a dictionary that has a history, X is a trajectory and Y the same one step later.
-            Y: their successors (n, m).
+            X: states (n, m), one per column. With a dictionary that has a history, X is a trajectory and Y the same
+                one step later.
+            Y: their successors (n, m), one per column.
             inputs: inputs U (q, m), u_t acting between x_t and y_t; None for an autonomous system.
             input_dictionary: Theta, a dictionary of [x; u]; u itself if none is given, which makes B u of it.
             weights: positive weight of each pair's squared error, one for each column of Psi(X); all 1 if not given.
@@ -114,7 +127,10 @@ class EDMD:
         regularization: Regularization = Regularization(),  # noqa: B008 - frozen
         dt: float = 1.0,
     ) -> EDMD:
-        """Fit to trajectories (n, m), each of its own length; inputs (q, m - 1) act between their columns.
+        """Fit to trajectories (n, m), each of its own length, their columns consecutive states.
+
+        Pairs never cross from one trajectory to the next. Inputs (q, m - 1), one matrix for each trajectory, act
+        between its columns.
 
         Raises:
             KoopmanError: as `fit`, and if a trajectory is too short for one pair.
@@ -124,8 +140,7 @@ class EDMD:
 
     @classmethod
     def _fitted(cls, pairs: Pairs, weights: ArrayLike | None, how: Regularization, dt: float) -> EDMD:
-        if not 0.0 < dt < float("inf"):
-            raise KoopmanError(f"the time between samples must be positive and finite, not {dt}")
+        check_time_step(dt)
         data, targets = np.vstack([pairs.psi_x, pairs.theta]), pairs.psi_y
         if weights is not None:
             checked = as_vector(weights, "the weights", data.shape[1])
@@ -160,15 +175,19 @@ class EDMD:
         return np.asarray(self.c @ self.spectrum.right)
 
     def eigenfunctions(self, X: ArrayLike) -> ComplexMatrix:
-        """Evaluate the eigenfunctions phi_j at states (n, m): shape (k, m - history), in the eigenvalues' order."""
+        """Evaluate the eigenfunctions phi_j at states (n, m), one per column.
+
+        Returns:
+            Values (k, m - history), one column per state, rows in the order of the eigenvalues.
+        """
         return np.asarray(self.spectrum.left @ self.dictionary(X))
 
     def reconstruct(self, Z: ArrayLike) -> Matrix:
-        """Return the states C Z (n, m) of observables Z (k, m)."""
+        """Return the states C Z (n, m) of observables Z (k, m), one column per snapshot."""
         return self.c @ as_matrix(Z, "the observables", self.dictionary.size)
 
     def predict(self, start: ArrayLike, steps: int, *, inputs: ArrayLike | None = None, relift: bool = False) -> Matrix:
-        """Predict the next states: shape (n, steps), the start not included.
+        """Predict the next states: shape (n, steps), one per column, the start not included.
 
         By default the start is lifted once and K applied again and again, C K^t Psi(x_0): this is the linear system
         that eigenvalues, eigenfunctions and modes describe, and it is exact if the dictionary's span is invariant. If
@@ -176,16 +195,17 @@ class EDMD:
         to the state and lifts it anew, x_t+1 = C K Psi(x_t), a nonlinear model. The first step is the same.
 
         Args:
-            start: x_0 and, if the dictionary has a history, the states before it: (n, history + 1), the newest last.
+            start: x_0 as a column (n, 1); if the dictionary has a history, with the states before it, (n, history + 1),
+                the newest last.
             steps: how many, zero or more.
-            inputs: inputs (q, steps) for a model with inputs.
+            inputs: inputs (q, steps), one column per step, for a model with inputs.
             relift: lift anew in each step.
 
         Raises:
             KoopmanError: on wrong shapes, or if the prediction overflows.
         """
-        if steps < 0:
-            raise KoopmanError(f"the number of steps must not be negative, but it is {steps}")
+        if not isinstance(steps, Integral) or steps < 0:
+            raise KoopmanError(f"the number of steps must be whole and must not be negative, but it is {steps!r}")
         window = as_matrix(start, "the start", self.dictionary.dimension, self.dictionary.history + 1)
         u = self._inputs(inputs, steps)
         lifted, state = self.dictionary(window), window[:, -1:]

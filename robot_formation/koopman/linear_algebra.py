@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -20,18 +21,31 @@ class KoopmanError(FormationError):
 
 
 def as_matrix(value: ArrayLike, what: str, rows: int | None = None, columns: int | None = None) -> Matrix:
-    """Return a finite matrix of floats, of the given shape where one is given.
+    """Return a finite matrix of floats, one column per snapshot, of the given shape where one is given.
 
     Raises:
-        KoopmanError: if it is none.
+        KoopmanError: if it is none; the text says so where rows and columns are swapped.
     """
     matrix = _floats(value, what)
     if matrix.ndim != 2 or (rows is not None and matrix.shape[0] != rows):
         wanted = "" if rows is None else f" with {rows} row{'s' * (rows != 1)}"
-        raise KoopmanError(f"{what} must be a matrix{wanted}, one column per snapshot, not of shape {matrix.shape}")
+        text = f"{what} must be a matrix{wanted}, one column per snapshot, not of shape {matrix.shape}"
+        raise KoopmanError(text + _remedy(matrix, rows))
     if columns is not None and matrix.shape[1] != columns:
-        raise KoopmanError(f"{what} must have {columns} column{'s' * (columns != 1)}, not {matrix.shape[1]}")
+        text = f"{what} must have {columns} column{'s' * (columns != 1)}, not {matrix.shape[1]}"
+        swapped = rows is None and matrix.shape[0] == columns
+        raise KoopmanError(text + ("; it has as many rows: transpose it" if swapped else ""))
     return matrix
+
+
+def _remedy(matrix: Matrix, rows: int | None) -> str:
+    """Say what to do with an array that holds snapshots of the right length in the wrong places."""
+    if rows is not None and matrix.ndim == 2 and matrix.shape[1] == rows:
+        count = matrix.shape[0]
+        return f"; it has {count} row{'s' * (count != 1)} of {rows} values, so its snapshots are rows: transpose it"
+    if rows is not None and matrix.shape == (rows,):
+        return "; one snapshot is a column by itself: reshape(-1, 1)"
+    return "; snapshots of one value are a single row: reshape(1, -1)" if rows == 1 and matrix.ndim == 1 else ""
 
 
 def as_vector(value: ArrayLike, what: str, length: int) -> Vector:
@@ -48,6 +62,8 @@ def as_vector(value: ArrayLike, what: str, length: int) -> Vector:
 
 def _floats(value: ArrayLike, what: str) -> Matrix:
     try:
+        if np.iscomplexobj(value):
+            raise KoopmanError(f"{what} must hold real numbers only, not complex ones")
         array = np.asarray(value, dtype=float)
     except (TypeError, ValueError) as error:
         raise KoopmanError(f"{what} must hold real numbers only: {error}") from error
@@ -64,6 +80,16 @@ def check_finite(array: Matrix | ComplexMatrix, what: str) -> None:
     """
     if not np.isfinite(array).all():
         raise KoopmanError(f"{what} overflows: scale the data to smaller numbers, or use fewer steps or lower degrees")
+
+
+def check_time_step(dt: float) -> None:
+    """Refuse what is no time between samples.
+
+    Raises:
+        KoopmanError: if dt is no number, or not positive and finite.
+    """
+    if not (isinstance(dt, Real) and 0.0 < dt < float("inf")):
+        raise KoopmanError(f"the time between samples must be a number, positive and finite, not {dt!r}")
 
 
 def singular_values(a: Matrix) -> tuple[Matrix, Vector, Matrix]:
@@ -95,12 +121,13 @@ class Regularization:
     tolerance: float | None = None
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.ridge < float("inf"):
-            raise KoopmanError(f"the ridge must be zero or positive and finite, not {self.ridge}")
-        if self.rank is not None and self.rank < 1:
-            raise KoopmanError(f"the rank must be at least 1, not {self.rank}")
-        if self.tolerance is not None and not 0.0 <= self.tolerance < 1.0:
-            raise KoopmanError(f"the tolerance must be in [0, 1), not {self.tolerance}")
+        ridge, rank, tolerance = self.ridge, self.rank, self.tolerance
+        if not (isinstance(ridge, Real) and 0.0 <= ridge < float("inf")):
+            raise KoopmanError(f"the ridge must be a number, zero or positive and finite, not {ridge!r}")
+        if rank is not None and not (isinstance(rank, Integral) and rank >= 1):
+            raise KoopmanError(f"the rank must be a whole number of at least 1, or None, not {rank!r}")
+        if tolerance is not None and not (isinstance(tolerance, Real) and 0.0 <= tolerance < 1.0):
+            raise KoopmanError(f"the tolerance must be a number in [0, 1), or None, not {tolerance!r}")
 
 
 @dataclass(frozen=True, eq=False)

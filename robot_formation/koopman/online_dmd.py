@@ -102,6 +102,11 @@ class OnlineDMD(RecursiveFit):
             self._take(_Fit(self._r, self._z, *self.solve(self._r, self._z)))
 
     @property
+    def fitted(self) -> bool:
+        """Whether K comes from a pair or a prior."""
+        return self._p is not None or len(self._r) > 0
+
+    @property
     def started(self) -> bool:
         """Whether the data, with the prior, have full rank."""
         return self._p is not None or self._kept[1] == self.dimension
@@ -125,6 +130,10 @@ class OnlineDMD(RecursiveFit):
 
     def update(self, x: ArrayLike, y: ArrayLike) -> Vector:
         """Update with one measured pair; return the innovation y - K x of the K before the update, shape (outputs,).
+
+        Args:
+            x: shape (n,). Of matrices of snapshots, one column or row after the other.
+            y: shape (outputs,).
 
         Raises:
             KoopmanError: on a wrong shape, or a value that is not finite or beyond 1e100; nothing is learned then.

@@ -62,7 +62,12 @@ class Pairs:
         Raises:
             KoopmanError: as `of`, if a trajectory is too short, or if there are not as many inputs as trajectories.
         """
-        if not trajectories or (inputs is not None and len(inputs) != len(trajectories)):
+        if isinstance(trajectories, np.ndarray) and trajectories.ndim == 2:
+            raise KoopmanError(
+                f"trajectories must be a list of matrices (n, m), not one of shape {trajectories.shape}: "
+                "put a single trajectory into a list"
+            )
+        if not len(trajectories) or (inputs is not None and len(inputs) != len(trajectories)):
             raise KoopmanError("there must be at least one trajectory, and as many inputs if there are any")
         parts = []
         for i, trajectory in enumerate(trajectories):

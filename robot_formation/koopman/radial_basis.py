@@ -49,7 +49,11 @@ class RadialBasis(Observables):
         super().__init__(columns.shape[0], [f"{kind}(x - c{i + 1})" for i in range(columns.shape[1])])
         self.centres = columns.copy()
         self.width = width
-        self._function = KINDS[kind]
+        self._kind = kind
+
+    def __repr__(self) -> str:
+        n, k = self.centres.shape
+        return f"RadialBasis(<{k} centres of length {n}>, '{self._kind}', width={self.width:.6g})"
 
     @classmethod
     def from_data(
@@ -61,7 +65,7 @@ class RadialBasis(Observables):
         *,
         width: float | None = None,
     ) -> RadialBasis:
-        """Choose centres among the snapshots (n, m), spread out, and if none is given a width.
+        """Choose centres among the snapshots (n, m), one per column, spread out, and if none is given a width.
 
         The first is drawn uniformly, each next one with a probability proportional to the squared distance to the
         nearest centre so far (the start of k-means++, Arthur and Vassilvitskii 2007). The width is then the median
@@ -88,7 +92,7 @@ class RadialBasis(Observables):
         return cls(centres, kind, width=width)
 
     def _lift(self, X: Matrix) -> Matrix:
-        return self._function(_distances(X, self.centres) / self.width)
+        return KINDS[self._kind](_distances(X, self.centres) / self.width)
 
 
 def _distances(X: Matrix, centres: Matrix) -> Matrix:

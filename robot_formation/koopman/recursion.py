@@ -74,6 +74,21 @@ class RecursiveFit:
             raise KoopmanError(f"prior weights must all be zero, or all between {_FINEST:g} and {_COARSEST:g}")
         return weights
 
+    def __repr__(self) -> str:
+        shown = [f"{self.dimension}", *self._arguments()]
+        if self.outputs != self.dimension:
+            shown.append(f"outputs={self.outputs}")
+        if self.forgetting != 1.0:
+            shown.append(f"forgetting={self.forgetting:g}")
+        if self._weights.any():
+            same = bool((self._weights == self._weights[0]).all())
+            shown.append(f"prior_weight={self._weights[0]:g}" if same else f"prior_weight=<{self.dimension} numbers>")
+        return f"{type(self).__name__}({', '.join(shown)})"
+
+    def _arguments(self) -> list[str]:
+        """Write what else a subclass needs to be made, after the dimension."""
+        return []
+
     def prior_rows(self) -> Matrix:
         """Return the prior as rows of X': (n, n), or (0, n) without a prior."""
         rows = np.diag(np.sqrt(self._weights))
@@ -95,7 +110,11 @@ class RecursiveFit:
         if fits and sum(map(abs, before.tolist())) <= _LARGEST and sum(map(abs, after.tolist())) <= _LARGEST:
             return before, after
         lengths = f"two finite vectors of length {n}" if n == q else f"two finite vectors of lengths {n} and {q}"
-        raise KoopmanError(f"a pair must be {lengths} whose magnitudes add up to at most {_LARGEST:g}")
+        text = f"a pair must be {lengths} whose magnitudes add up to at most {_LARGEST:g}"
+        if fits:
+            raise KoopmanError(text)
+        several = "; of many pairs, update with one after the other" if 2 in (before.ndim, after.ndim) else ""
+        raise KoopmanError(f"{text}, not arrays of shapes {before.shape} and {after.shape}{several}")
 
     def solve(self, rows: Matrix, targets: Matrix) -> tuple[Matrix, Vector, Matrix]:
         """Solve rows (K - K0)' = targets for the K of least |K - K0|.

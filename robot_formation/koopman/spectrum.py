@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.koopman.linear_algebra import ComplexMatrix, KoopmanError, Matrix, as_matrix
+from robot_formation.koopman.linear_algebra import ComplexMatrix, KoopmanError, Matrix, as_matrix, check_time_step
 
 # Eigenvectors that are dependent to this degree come from a defective K; the part they share is used once.
 _DEPENDENT = 1e-10
@@ -31,6 +31,12 @@ class Spectrum:
     right: ComplexMatrix
     condition_number: float
 
+    def __repr__(self) -> str:
+        values = np.array2string(self.eigenvalues, precision=4, threshold=6, edgeitems=2, max_line_width=1000)
+        return (
+            f"<Spectrum of {len(self.eigenvalues)} eigenvalues {values}, condition number {self.condition_number:.3g}>"
+        )
+
     def continuous(self, dt: float) -> NDArray[np.complex128]:
         """Return the eigenvalues in continuous time, log(eigenvalue) / dt, for samples dt seconds apart.
 
@@ -40,8 +46,7 @@ class Spectrum:
         Raises:
             KoopmanError: if dt is not positive and finite.
         """
-        if not 0.0 < dt < float("inf"):
-            raise KoopmanError(f"the time between samples must be positive and finite, not {dt}")
+        check_time_step(dt)
         with np.errstate(divide="ignore"):
             moduli = np.log(np.abs(self.eigenvalues))
         return np.asarray(moduli / dt + 1j * (np.angle(self.eigenvalues) / dt), dtype=complex)
@@ -51,11 +56,11 @@ def spectrum(k: Matrix) -> Spectrum:
     """Decompose a square K (k, k).
 
     Raises:
-        KoopmanError: if K is not square and finite, or its eigenvalues can't be found.
+        KoopmanError: if K is empty, not square or not finite, or its eigenvalues can't be found.
     """
     k = as_matrix(k, "K")
-    if k.shape[0] != k.shape[1]:
-        raise KoopmanError(f"only a square K has eigenvalues, not one of shape {k.shape}")
+    if k.shape[0] != k.shape[1] or not k.size:
+        raise KoopmanError(f"only a square K of one row at least has eigenvalues, not one of shape {k.shape}")
     try:
         found, columns = np.linalg.eig(k.T)
         order = np.lexsort((-found.imag, -np.abs(found)))

@@ -55,6 +55,14 @@ class WindowedDMD(RecursiveFit):
         if self._weights.any():
             self._fit([], 1.0)
 
+    def _arguments(self) -> list[str]:
+        return [str(self.window)]
+
+    @property
+    def fitted(self) -> bool:
+        """Whether K comes from a pair or a prior."""
+        return self._singular.size > 0
+
     @property
     def started(self) -> bool:
         """Whether the window, with the prior, has full rank."""
@@ -71,7 +79,7 @@ class WindowedDMD(RecursiveFit):
         return float(self._singular[0] / self._singular[-1]) if self.started else float("inf")
 
     def update(self, x: ArrayLike, y: ArrayLike) -> Vector:
-        """Update with one measured pair and drop the oldest of a full window.
+        """Update with one measured pair and drop the oldest of a full window; x has the shape (n,), y (outputs,).
 
         Returns:
             The innovation y - K x of the K before the update, shape (outputs,).

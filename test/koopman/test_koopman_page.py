@@ -2,6 +2,7 @@
 
 import ast
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -27,6 +28,19 @@ def test_the_example_runs_and_prints_what_it_says(capsys: pytest.CaptureFixture[
     stated = found(r"# (\[[^]]*\]): mu, 2 mu, lam", code)
     assert printed.startswith(stated)
     assert names["model"].training_errors.state < 1e-12
+
+
+def test_the_estimators_example_runs_and_prints_what_it_says(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[1]
+    names: dict[str, Any] = {}
+    exec(compile(code, "docs/explanation/koopman.md", "exec"), names)
+    assert capsys.readouterr().out.splitlines() == re.findall(r"^print.*  # (.*)$", code, re.MULTILINE)
+    assert names["X"].shape == names["y"].shape == (54, 1)
+    assert len(names["groups"]) == 54
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["modes.png", "spectrum.png"]
 
 
 def test_the_page_names_the_whole_public_interface() -> None:

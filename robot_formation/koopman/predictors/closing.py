@@ -224,6 +224,9 @@ class Closing:
         self._filter = ClosedResidual(parameters)
         self._bias = ActuationBias(parameters)
 
+    def __repr__(self) -> str:
+        return f"Closing({self._model!r})"
+
     def observe(
         self,
         displacement: Vector,

@@ -33,6 +33,9 @@ class Literal:
         self._k: Matrix | None = None
         self._state: Vector = np.zeros(2)
 
+    def __repr__(self) -> str:
+        return "Literal()"
+
     def observe(self, x: Vector) -> None:
         """See `Model`; from the fourth on only the number of observations matters."""
         if self._k is not None:
@@ -95,6 +98,9 @@ class Measured:
         self._measured = True
         self._innovation: Vector | None = None
         self._log = PairLog(2)
+
+    def __repr__(self) -> str:
+        return f"Measured({self._dmd!r})"
 
     def observe(self, x: Vector) -> None:
         """See `Model`; a pair is learned from only if both of its displacements were measured."""
@@ -173,6 +179,9 @@ class Edmd:
         self._measured = True
         self._innovation: Vector | None = None
         self._log = PairLog(size)
+
+    def __repr__(self) -> str:
+        return f"Edmd('{self.text}', {self._dmd!r})"
 
     def observe(self, x: Vector) -> None:
         """See `Model`; a pair is learned from only if its second displacement and the one before were measured."""

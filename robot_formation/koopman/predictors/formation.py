@@ -79,6 +79,9 @@ class MixedExperts:
         self._last_turn = 0.0
         self._begun = False
 
+    def __repr__(self) -> str:
+        return f"MixedExperts({', '.join(self._chosen)})"
+
     def observe(
         self,
         displacement: Vector,

@@ -77,6 +77,9 @@ class Previous:
     def __init__(self, parameters: PredictorParameters, size: int = 2) -> None:
         self._last: Vector = np.zeros(size)
 
+    def __repr__(self) -> str:
+        return "Previous()"
+
     def observe(self, x: Vector) -> None:
         """See `Model`."""
         self._last = x
@@ -112,6 +115,9 @@ class Ewma:
         self._gain = parameters.ewma.gain
         self._size = size
         self._mean: Vector | None = None
+
+    def __repr__(self) -> str:
+        return f"Ewma(gain={self._gain:g})"
 
     def observe(self, x: Vector) -> None:
         """See `Model`."""
@@ -212,6 +218,9 @@ class KalmanTrend:
 
     def __init__(self, parameters: PredictorParameters, size: int = 2) -> None:
         self._filter = TrendFilter(parameters.kalman_trend, size)
+
+    def __repr__(self) -> str:
+        return "KalmanTrend()"
 
     def observe(self, x: Vector) -> None:
         """See `Model`."""

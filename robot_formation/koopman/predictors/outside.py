@@ -42,6 +42,9 @@ class OutsideModel:
         self._takes_steps = _takes_an_argument(self._made.forecast)
         self._shown: list[list[float]] | None = None if hasattr(self._made, "state") else []
 
+    def __repr__(self) -> str:
+        return f"OutsideModel('{self._name}')"
+
     def observe(self, x: Vector) -> None:
         """Update with the measured displacement (3,) of a timestep."""
         self._call("observe", self._made.observe, x.copy())

@@ -135,6 +135,10 @@ class Predictor:
         self._seen = False
         self.observations = 0
 
+    def __repr__(self) -> str:
+        model = self._model if self._closing is None else self._closing
+        return f"<Predictor '{self.name}' after {self.observations} observations: {model!r}>"
+
     @property
     def name(self) -> str:
         """The predictor's name."""
@@ -159,7 +163,8 @@ class Predictor:
         residuals knew nothing of it. Models without residual feedback take no notice.
 
         Raises:
-            PredictionError: if a component is not finite or longer than ten times the bound.
+            PredictionError: if a vector has another shape, or a component is not finite or longer than ten times the
+                bound.
         """
         if not (math.isfinite(caught_up_rad) and caught_up_rad >= 0.0):
             raise PredictionError(f"caught_up_rad is {caught_up_rad}; it must be finite and not negative")
@@ -291,6 +296,8 @@ class Predictor:
     def _checked(self, what: str, value: Vector, *, turn_unknown: bool = False) -> Vector:
         """Return a copy of a vector (3,); refuse what no robot can do."""
         x = np.array(value, dtype=float)
+        if x.shape != (3,):
+            raise PredictionError(f"refused the {what}: it must be (u, v, turn), shape (3,), not {x.shape}")
         u, v, turn = x.tolist()
         largest_u, largest_v, largest_turn = self._largest
         unknown = turn_unknown and math.isnan(turn)

@@ -54,6 +54,9 @@ class Spatial:
     def __init__(self, uv: Model, turn: Model) -> None:
         self._uv, self._turn = uv, turn
 
+    def __repr__(self) -> str:
+        return f"Spatial({self._uv!r}, turn={self._turn!r})"
+
     def observe(self, x: Vector) -> None:
         """Update with the measured displacement (3,) of a timestep."""
         self._uv.observe(x[:2])
