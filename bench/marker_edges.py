@@ -4,7 +4,9 @@ Two robots stand on the default bowl at random places: near the formation and ne
 the first alignment looks from, and anywhere in view. The true pose is put through the marker's projection; printed are
 reported minus projected edges, by reported width where the error jumps, and how often a face of some width is reported.
 
-Run: python bench/marker_edges.py [--looks 4000] [--seed 1] [--jobs N]
+With --board a light board stands behind the marker, as in a chain with rigid spacing.
+
+Run: python bench/marker_edges.py [--looks 4000] [--seed 1] [--jobs N] [--board]
 """
 
 import argparse
@@ -39,6 +41,7 @@ from robot_formation.world.pose import Pose
 from robot_formation.world.world import World
 
 MODEL, EDGES = MarkerModel(GeometryParameters()), EdgeParameters()
+BOARD = ("world.marker.backdrop_m=0.16",)
 OUTER = {Face.FRONT: "right", Face.REAR: "left"}
 NAMES = {Face.TARGET: "Target", Face.FRONT: "Front", Face.REAR: "Rear"}
 
@@ -92,9 +95,9 @@ def look(made: Equipment, start: Start, seed: int) -> Look | None:
     return state, mean_boxes([one_marker(blocks, lambda block: -block.width * block.height) for blocks in last])
 
 
-def looks(place: Callable[[np.random.Generator], Place], count: int, seed: int) -> list[Look]:
+def looks(place: Callable[[np.random.Generator], Place], count: int, seed: int, board: bool) -> list[Look]:
     """Looks from random places."""
-    rng, made = np.random.default_rng(seed), equipment("precise")
+    rng, made = np.random.default_rng(seed), equipment("precise", BOARD if board else ())
     found: list[Look | None] = []
     for number in range(count):
         ahead, left, yaw = place(rng)
@@ -141,9 +144,10 @@ def main() -> None:
     parser.add_argument("--looks", type=int, default=4000, help="of each kind")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--board", action="store_true", help="with a light board behind the marker")
     args = parser.parse_args()
     for title, place in (("near the formation", near), ("anywhere in view", anywhere)):
-        parts = ((place, args.looks // 16, 16 * args.seed + part) for part in range(16))
+        parts = ((place, args.looks // 16, 16 * args.seed + part, args.board) for part in range(16))
         found = [entry for part in run_parallel(looks, parts, args.jobs) for entry in part]
         edges, shown = errors(found)
         print(f"{title}: {len(found)} looks\n\n| edge | looks | mean error, px | scatter, px |\n|---|---|---|---|")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robot_formation.schedule.schedules import Schedule, Spacing
+from robot_formation.world.parameters import MarkerParameters
 
 _DARK = {"marker.backdrop_rgb": (12, 12, 13)}
 """With delayed spacing a look is at a robot that stands ahead, whose Rear face shows as a narrow strip: before a light
@@ -12,6 +13,11 @@ board that is a block now and then, and chains of ten were lost."""
 _BACKDROP: dict[str, object] = {"marker.backdrop_m": 0.16}
 """Boards behind the markers of a chain: without them a follower sees its neighbour's neighbour's marker beside its
 neighbour's as soon as they don't stand in a row, and takes both for one that is nearer. Hides 8 cm per robot."""
+_BEFORE_LIGHT_BOARD = {"precise.edges.target_bottom_px": -1.8}
+"""Before a light board the detector ends the Target block 0.7 px higher than before the robot's own body: measured as
+`bench/marker_edges.py --board` does. Uncorrected, followers stand 6 mm too near."""
+_LEAST_LIGHT = 180
+"""Least colour component of such a board."""
 _NO_HEADING_CHECKS = {
     "precise.heading_check.turned_rad": 1000.0,
     "precise.heading_check.beside_sigmas": 1e6,
@@ -23,6 +29,12 @@ def backdrop(followers: int, spacing: Spacing, own: Mapping[str, object]) -> dic
     """Return the world's parameters of a chain's markers, apart from those that are set."""
     found = {**_BACKDROP, **(_DARK if spacing is Spacing.DELAYED else {})}
     return {name: value for name, value in found.items() if followers > 1 and name not in own}
+
+
+def edges_before_board(marker: MarkerParameters, own: Mapping[str, object]) -> dict[str, float]:
+    """Return the fine-tuner's parameters of how the edges of a marker before its board are reported."""
+    light = marker.backdrop_m > 0.0 and min(marker.backdrop_rgb) >= _LEAST_LIGHT
+    return {name: value for name, value in _BEFORE_LIGHT_BOARD.items() if light and name not in own}
 
 
 def unchecked_headings(schedule: Schedule, own: Mapping[str, object]) -> dict[str, float]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from robot_formation.geometry.orientation import Vector, rotate
+from robot_formation.geometry.orientation import Quaternion, Vector, rotate
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
 from robot_formation.world.events import BodyState
@@ -173,9 +173,14 @@ class Body:
         (vx, vy, vz), (wx, wy, wz) = _read_velocity(self.index, self._client)
         return vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz
 
+    def placement(self) -> tuple[Vector, Quaternion]:
+        """Place and orientation of the centre of mass: they tell at the least cost whether the body has moved."""
+        found: tuple[Vector, Quaternion] = _read_pose(self.index, self._client)
+        return found
+
     def pose(self) -> Pose:
         """Pose of base_link."""
-        (x, y, z), orientation = pybullet.getBasePositionAndOrientation(self.index, physicsClientId=self._client)
+        (x, y, z), orientation = self.placement()
         ox, oy, oz = rotate(orientation, self._mass_offset)
         return Pose((x - ox, y - oy, z - oz), orientation)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from robot_formation.extras import require
 from robot_formation.system.standard_error import silent_stderr
 
+require("sim")
 with silent_stderr():
     import pybullet
 

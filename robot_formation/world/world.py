@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
+from typing import NamedTuple
 
+from robot_formation.geometry.orientation import Quaternion, Vector
 from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
@@ -19,6 +21,20 @@ from robot_formation.world.sensor import Development, Sensor
 from robot_formation.world.start import RobotStart
 
 MAX_FRAMES_OWED = 600
+
+
+class _Picture(NamedTuple):
+    """A robot's last picture before noise, for as long as nothing in view moves.
+
+    Attributes:
+        placements: of all robots, by which it is told at once that nothing has moved.
+        poses: of the robot itself, then of those that it may see.
+        development: the picture.
+    """
+
+    placements: list[tuple[Vector, Quaternion]]
+    poses: list[Pose]
+    development: Development
 
 
 class World:
@@ -69,7 +85,7 @@ class World:
         self._frames_owed = {start.name: 0 for start in robots if start.camera}
         self._camera = Camera(surface, parameters)
         self._sensors = {name: Sensor(parameters.camera, seed, name) for name in self._frames_owed}
-        self._pictures: dict[str, tuple[tuple[Pose, ...], Development]] = {}
+        self._pictures: dict[str, _Picture] = {}
         self._owed_until = 0  # step up to which time goes on by itself
 
     # --- asking -----------------------------------------------------------------------------------------------------
@@ -227,13 +243,13 @@ class World:
     def _motion_events(self) -> list[Event]:
         events: list[Event] = []
         due = self.step_count % self._state_steps == 0
-        stamp = self.stamp_ns
         for name, robot in self._robots.items():
             if not robot.moving:
                 continue
             final = robot.finished()
             if not (final or due):
                 continue
+            stamp = self.stamp_ns
             left = off_plate(self.surface, robot.body.pose(), self.parameters.marker.top_m)
             if left is not None:
                 robot.hold()
@@ -256,15 +272,19 @@ class World:
         return frames
 
     def _take_picture(self, name: str) -> RenderedPicture:
-        own = self._robots[name].body.pose()
-        seen = self._camera.may_see(own, [robot.body.pose() for other, robot in self._robots.items() if other != name])
-        key = (own, *seen)
         sensor = self._sensors[name]
-        cached = self._pictures.get(name)
-        if cached is None or cached[0] != key:
-            cached = (key, sensor.develop(self._camera.light(own, seen)))
-            self._pictures[name] = cached
-        return sensor.expose(cached[1], self.step_count / self.parameters.physics_hz)
+        placements = [robot.body.placement() for robot in self._robots.values()]
+        kept = self._pictures.get(name)
+        if kept is None or kept.placements != placements:
+            own = self._robots[name].body.pose()
+            others = [robot.body.pose() for other, robot in self._robots.items() if other != name]
+            poses = [own, *self._camera.may_see(own, others)]
+            if kept is None or kept.poses != poses:
+                development = sensor.develop(self._camera.light(own, poses[1:]))
+            else:
+                development = kept.development
+            kept = self._pictures[name] = _Picture(placements, poses, development)
+        return sensor.expose(kept.development, self.step_count / self.parameters.physics_hz)
 
     # --- checks -----------------------------------------------------------------------------------------------------
 

@@ -11,12 +11,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from robot_formation.parameters import parameter
 
 # All chosen.
 _MEMORY = 0.6
 """Share of earlier deviations in the sum that is compared with the bound: turns lead several steps to the same side."""
+_EARLY = 5
+"""Deviations before their own scatter is known well enough: until then the forecasts' standard deviations count."""
+_FIRST_SCATTER_M, _LEAST_SCATTER_M = 0.003, 0.0015
+"""Scatter of the deviations beforehand, and the least: of leaders that drive straight ahead it is 1.5 to 2.5 mm."""
+_SCATTER_GAIN, _SCATTER_MARGIN = 0.15, 1.25
+"""Weight of the latest deviation in the mean of their squares, and a factor on what follows from so few. Without it
+the larger deviations of `previous` and `measured` called for checks of leaders that drive straight ahead."""
+_OUTLIER_SIGMAS = 3.0
+"""A deviation counts as so many times the scatter at most: else a turn would hide itself by the scatter it makes."""
 _FOUND_RAD = math.radians(3.0)
 """A heading that a check finds so far from where it was expected had turned unnoticed."""
 _FOLLOW_UPS = 2
@@ -36,8 +46,9 @@ class HeadingCheckParameters:
     )
     beside_sigmas: float = parameter(
         3.0,
-        "Sum of the steps' deviations aside from their forecasts, in standard deviations, earlier ones counting less, "
-        "from which on the heading is checked; twice as much after each check that finds no turn",
+        "Sum of the steps' deviations aside from their forecasts, in standard deviations of such deviations so far, "
+        "earlier ones counting less, from which on the heading is checked; twice as much after each check that finds "
+        "no turn",
         low=0.1,
         high=1e6,
     )
@@ -53,6 +64,30 @@ class HeadingCheckParameters:
     )
 
 
+class Deviation(NamedTuple):
+    """How far aside of its forecast the neighbour's step ended, and the standard deviation that the forecast states."""
+
+    aside_m: float
+    sigma_m: float
+
+
+class _Scatter:
+    """How far steps usually end aside of their forecasts: a forecast's own covariance is two to four times too wide."""
+
+    def __init__(self) -> None:
+        self._square_m2 = _FIRST_SCATTER_M**2
+        self._count = 0
+
+    def in_sigmas(self, deviation: Deviation) -> float:
+        """Return a deviation in standard deviations of the earlier ones, and count it in."""
+        usual_m = max(_SCATTER_MARGIN * math.sqrt(self._square_m2), _LEAST_SCATTER_M)
+        scatter_m = deviation.sigma_m if self._count < _EARLY else min(usual_m, deviation.sigma_m)
+        counted_m = min(abs(deviation.aside_m), _OUTLIER_SIGMAS * scatter_m)
+        self._square_m2 += _SCATTER_GAIN * (counted_m**2 - self._square_m2)
+        self._count += 1
+        return deviation.aside_m / scatter_m
+
+
 class HeadingCheck:
     """Keeps what calls for a check, from one timestep to the next.
 
@@ -66,6 +101,7 @@ class HeadingCheck:
         self._p = parameters
         self._turned_rad = 0.0
         self._beside_sigmas = 0.0
+        self._scatter = _Scatter()
         self._patience = 1.0
         self._follow_ups = 0
         self._beside = self._follow_up = False  # what called for the latest check
@@ -77,15 +113,17 @@ class HeadingCheck:
         self._turned_rad += turn_rad
         self._patience = max(1.0, _PATIENCE_KEPT * self._patience)
 
-    def due(self, beside_sigmas: float, sigma_rad: float) -> bool:
+    def due(self, deviation: Deviation | None, sigma_rad: float) -> bool:
         """Process a timestep's first look, and tell whether the heading is to be checked.
 
         Args:
-            beside_sigmas: how far aside of its forecast the neighbour's step ended, in standard deviations.
+            deviation: of the neighbour's step from its forecast, where both are known.
             sigma_rad: standard deviation of the heading.
         """
         p = self._p
-        self._beside_sigmas = _MEMORY * self._beside_sigmas + beside_sigmas
+        self._beside_sigmas *= _MEMORY
+        if deviation is not None:
+            self._beside_sigmas += self._scatter.in_sigmas(deviation)
         self._beside, self._follow_up = False, self._follow_ups > 0
         if self._follow_up:
             self._follow_ups -= 1

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from robot_formation.alignment.mode import Decision, Frames, Verdict
 from robot_formation.alignment.observation import FaceBox
 from robot_formation.alignment.precise.actuation_model import ActuationModel, ActuationParameters
-from robot_formation.alignment.precise.heading_check import HeadingCheck, HeadingCheckParameters
+from robot_formation.alignment.precise.heading_check import Deviation, HeadingCheck, HeadingCheckParameters
 from robot_formation.alignment.precise.marker_edges import EdgeParameters, mean_boxes
 from robot_formation.alignment.precise.marker_projection import (
     YAW,
@@ -222,7 +222,7 @@ class PreciseAlignment:
             boxes: the look.
             expected_rad: the heading that was expected of it.
         """
-        if self._stepped and self._check.due(self._beside_sigmas(), self._filter.yaw_sigma_rad):
+        if self._stepped and self._check.due(self._deviation(), self._filter.yaw_sigma_rad):
             self._expected_rad, self._viewpoints, self._doubted = expected_rad, None, False
         self._stepped = False
         two_faces = len(boxes) > 1 and min(box.width for box in boxes.values()) >= _SECOND_FACE_PX
@@ -247,13 +247,13 @@ class PreciseAlignment:
             self._expected_rad, self._viewpoints = None, []  # still called for in the next timestep
         return motion, reason
 
-    def _beside_sigmas(self) -> float:
-        """Return how far aside of its forecast the neighbour's step ended, in standard deviations."""
+    def _deviation(self) -> Deviation | None:
+        """Return how far aside of its forecast the neighbour's step ended; None where either is unknown."""
         expected, found = self._way, self.offset()
         if expected is None or found is None:
-            return 0.0
+            return None
         sigma_m = max(_LEAST_FORECAST_SIGMA_M, math.sqrt(max(0.0, float(expected.matrix[1, 1]))))
-        return (found.mean.y_m - expected.mean.y_m) / sigma_m
+        return Deviation(found.mean.y_m - expected.mean.y_m, sigma_m)
 
     def _correct(self) -> Decision:
         p, state = self._p, self._filter.best.state

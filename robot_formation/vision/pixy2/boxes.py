@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import operator
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -68,7 +69,7 @@ def merged(boxes: list[Box], distance: int) -> list[Box]:
 
     Every box in turn takes in those after it; passes over all are repeated until one changes nothing.
     """
-    changed = True
+    changed = _some_near(boxes, distance)
     while changed:
         changed = False
         alive: list[Box] = []
@@ -88,6 +89,19 @@ def merged(boxes: list[Box], distance: int) -> list[Box]:
             alive.append(box)
         boxes = alive
     return boxes
+
+
+def _some_near(boxes: list[Box], distance: int) -> bool:
+    """Whether any two boxes are near enough to be looked at more closely; most boxes of a picture of many are not."""
+    from_left = sorted(boxes, key=operator.attrgetter("left"))
+    for place, box in enumerate(from_left, 1):
+        _, right, top, bottom = _reach(box, distance)
+        for other in itertools.islice(from_left, place, None):
+            if other.left > right:
+                break
+            if other.top <= bottom and other.bottom >= top:
+                return True
+    return False
 
 
 def _reach(box: Box, distance: int) -> tuple[int, int, int, int]:
@@ -141,10 +155,12 @@ def _nested_pairs(boxes: list[Box]) -> list[tuple[int, int]]:
     pairs = []
     from_left = sorted((box.left, i, box) for i, box in enumerate(boxes))
     for place, (_, i, box) in enumerate(from_left, 1):
-        right = box.right
+        right, top, bottom = box.right, box.top, box.bottom
         for left, j, other in itertools.islice(from_left, place, None):
             if left > right:
                 break
+            if other.top > bottom or other.bottom < top:
+                continue
             if _contains(box, other) or _contains(other, box):
                 pairs.append((i, j) if i < j else (j, i))
     return sorted(pairs)
