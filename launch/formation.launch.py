@@ -23,6 +23,7 @@ from robot_formation.launching.arguments import (
     ARGUMENTS,
     discovery,
     is_true,
+    left_out,
     rviz_config,
     rviz_remappings,
     scenario_of,
@@ -41,6 +42,7 @@ def nodes(context: LaunchContext) -> list[Node]:
     value = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
     scenario = scenario_of(value)
     bag = Path(value["bag"]).absolute() if value["bag"] else None
+    stand_ins, timeout_s = left_out(value, scenario)
     if bag is not None:
         check_free(bag)
     viewer = is_true(value["rviz"])
@@ -48,8 +50,10 @@ def nodes(context: LaunchContext) -> list[Node]:
         check_viewer()
     environment = discovery(value["discovery_range"], context.environment)
     namespace = value["namespace"]
-    table = processes(scenario, bag, images=is_true(value["images"]), namespace=namespace)
-    table.append(progress(scenario, namespace))
+    images = is_true(value["images"])
+    whole = processes(scenario, bag, images=images, namespace=namespace, stand_ins=stand_ins)
+    table = [process for process in whole if not process.stand_in]
+    table.append(progress(scenario, namespace, stand_ins, timeout_s))
     run = LaunchedRun(len(table), str(bag or ""))
     started: list[Node] = []
     started += [node(process, environment, on_exit(run, process, started)) for process in table]

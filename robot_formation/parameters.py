@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import math
 import re
 import types
@@ -114,6 +115,12 @@ _BARE = dict(parameter(None, "").metadata)
 """Of fields that were not made by `parameter`, as in classes from outside the package."""
 
 
+@functools.lru_cache(maxsize=256)
+def _type_hints(cls: type) -> dict[str, Any]:
+    """Types of a dataclass's fields. They are written as texts, and evaluating them takes most of a build's time."""
+    return typing.get_type_hints(cls)
+
+
 def specs(cls: type, prefix: str = "", *, defaults: object = None) -> dict[str, Spec]:
     """List the parameters of a dataclass by dotted name, nested dataclasses included.
 
@@ -123,7 +130,7 @@ def specs(cls: type, prefix: str = "", *, defaults: object = None) -> dict[str, 
         defaults: an instance of it, if its values and not the class's are the defaults.
     """
     found: dict[str, Spec] = {}
-    hints = typing.get_type_hints(cls)
+    hints = _type_hints(cls)
     for field in dataclasses.fields(cls):
         kind = hints[field.name]
         name = prefix + field.name
@@ -149,6 +156,12 @@ def specs(cls: type, prefix: str = "", *, defaults: object = None) -> dict[str, 
             meta["also"],
         )
     return found
+
+
+@functools.lru_cache(maxsize=256)
+def _known(cls: type) -> Mapping[str, Spec]:
+    """List the parameters of a dataclass: `specs`, only to be read, for what asks again and again."""
+    return types.MappingProxyType(specs(cls))
 
 
 def _plain(value: object) -> object:
@@ -225,7 +238,7 @@ def from_mapping(cls: type[T], values: Mapping[str, object], *, where: str) -> T
     Raises:
         ParameterError: on an unknown name, a wrong type, or a value outside its range or choices.
     """
-    known = specs(cls)
+    known = _known(typing.cast(type, cls))
     flat = flatten(values, where=where)
     for name in flat:
         if name not in known:
@@ -373,7 +386,7 @@ def _check_one(spec: Spec, kind: type, value: object, subject: str) -> object:
 
 
 def _build(cls: type[T], flat: Mapping[str, object], prefix: str = "", defaults: object = None) -> T:
-    hints = typing.get_type_hints(cls)
+    hints = _type_hints(typing.cast(type, cls))
     arguments: dict[str, Any] = {}
     for field in dataclasses.fields(cls):  # type: ignore[arg-type]
         kind = hints[field.name]

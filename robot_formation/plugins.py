@@ -13,7 +13,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
@@ -28,6 +28,9 @@ GROUPS: Mapping[str, str] = MappingProxyType(
     {kind: f"robot_formation.{kind}s" for kind in ("predictor", "surface", "path", "sensor")}
 )
 """Entry-point group of each kind of class that can be added."""
+
+NOTEBOOK = "__main__:"
+"""How names of classes of the running script or notebook begin."""
 
 FAILURES = (Exception, SystemExit)
 """What a class from outside may raise, whatever it does; an interrupt is the user's."""
@@ -83,9 +86,10 @@ def check_name(kind: str, name: str, own: Iterable[str]) -> None:
         raise unknown(kind, name, own)
 
 
-@cache
 def load(kind: str, name: str) -> type:
     """Import the class of this name from outside the package.
+
+    It is looked up in its module each time: a notebook may have defined it anew, or reloaded the module.
 
     Args:
         kind: a key of `GROUPS`.
@@ -101,7 +105,7 @@ def load(kind: str, name: str) -> type:
     subject = f"{kind} '{name}'{origin}"
     module, _, attribute = value.partition(":")
     try:
-        with _working_directory():
+        with nullcontext() if module in sys.modules else _working_directory():
             found = getattr(importlib.import_module(module), attribute.strip(), None)
     except ModuleNotFoundError as error:
         raise PluginError(f"{subject}: {_missing(str(error.name), module, packaged=plugin is not None)}") from error
@@ -180,6 +184,11 @@ def subject(error: PluginError) -> str:
     text = str(error)
     match = _SUBJECT.match(text)
     return match[0] if match else text
+
+
+def processes(jobs: int, names: Iterable[str]) -> int:
+    """Return how many processes may run classes of these names: other processes have another `__main__`."""
+    return 1 if any(name.startswith(NOTEBOOK) for name in names) else jobs
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from robot_formation.bag.run_details import node_parameters, said_slots, whole_number
+from robot_formation.bag.run_details import node_parameters, said_slots, stand_ins, whole_number
 from robot_formation.json_values import JsonObject
 
 _SEED_DIGITS = 19  # of 2^63 - 1
@@ -82,4 +82,5 @@ def run_facts(details: Mapping[str, str], *, in_process: bool | None = None) -> 
         "path": _word(node_parameters(details).get("leader", {}).get("path", "straight" if details else None)),
         "surface": details.get("surface"),
         "conditions": {**found, "in_process": in_process},
+        **({"stand_ins": nodes} if (nodes := stand_ins(details)) else {}),
     }

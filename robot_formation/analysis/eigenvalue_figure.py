@@ -14,6 +14,7 @@ from robot_formation.analysis.figures import run_title
 from robot_formation.analysis.plotting import new_figure, save_figure
 from robot_formation.analysis.quantities import RunAnalysis
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord
+from robot_formation.analysis.spectrum_figure import FARTHEST, draw_unit_circle, scatter_eigenvalues
 from robot_formation.analysis.style import AUXILIARY, styled
 from robot_formation.bag.run_details import node_parameters
 from robot_formation.koopman.linear_algebra import KoopmanError
@@ -23,8 +24,6 @@ from robot_formation.koopman.spectrum import spectrum
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_FARTHEST = 2.0
-"""Parts of eigenvalues beyond this are drawn at the picture's edge."""
 _LEAST_PAIRS = 2  # fewer don't determine K
 
 
@@ -48,10 +47,8 @@ def draw_eigenvalues(record: RunRecord, analysis: RunAnalysis, path: str | Path)
     panels = figure.subplots(rows, 2, squeeze=False, width_ratios=(1.0, 1.15))
     for (plane, moduli), follower in zip(panels, record.followers, strict=True):
         found = eigenvalues_over(follower, forgetting(record))
-        shown = _plane(plane, found)
+        eigenvalue_plane(plane, found)
         _moduli(moduli, found)
-        if shown is not None:
-            figure.colorbar(shown, ax=plane, label="timestep", shrink=0.8)
         if rows > 1:
             plane.set_title(follower.name.replace("_", " "), loc="left")
     figure.suptitle(f"{run_title(record, analysis)}\nEigenvalues of K, online DMD of the displacements", fontsize=11)
@@ -87,23 +84,13 @@ def forgetting(record: RunRecord) -> float:
     return float(said) if isinstance(said, (int, float)) and 0.0 < said <= 1.0 else 1.0
 
 
-def _plane(axes: Axes, found: Sequence[tuple[int, NDArray[np.complex128]]]) -> Any:
-    turn = np.linspace(0.0, 2.0 * np.pi, 200)
-    axes.plot(np.cos(turn), np.sin(turn), color=AUXILIARY, linewidth=1.0)
-    axes.axhline(0.0, color=AUXILIARY, linewidth=0.6)
-    axes.axvline(0.0, color=AUXILIARY, linewidth=0.6)
-    shown = None
-    if found:
-        values = np.concatenate([values for _, values in found])
-        numbers = np.repeat([t for t, _ in found], 2)
-        inside = np.clip(values.real, -_FARTHEST, _FARTHEST), np.clip(values.imag, -_FARTHEST, _FARTHEST)
-        shown = axes.scatter(*inside, c=numbers, cmap="cividis", s=26, edgecolors="black", linewidths=0.4, zorder=3)
-        beyond = int(((np.abs(values.real) > _FARTHEST) | (np.abs(values.imag) > _FARTHEST)).sum())
-        if beyond:
-            axes.set_title(f"{beyond} beyond {_FARTHEST:g}, at the edge", loc="right", fontsize=8)
-    reach = 1.15 if shown is None else max(1.15, 1.08 * float(np.abs(inside).max()))
-    axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="real part", ylabel="imaginary part")
-    return shown
+def eigenvalue_plane(axes: Axes, found: Sequence[tuple[int, NDArray[np.complex128]]]) -> None:
+    """Draw eigenvalues (2,) of timesteps in the complex plane with the unit circle, and a colour bar beside it."""
+    draw_unit_circle(axes)
+    values = np.concatenate([values for _, values in found]) if found else np.empty(0, dtype=complex)
+    shown = scatter_eigenvalues(axes, values, c=np.repeat([t for t, _ in found], 2), cmap="cividis", s=26)
+    if shown is not None:
+        axes.figure.colorbar(shown, ax=axes, label="timestep", shrink=0.8)
 
 
 def _moduli(axes: Axes, found: Sequence[tuple[int, NDArray[np.complex128]]]) -> None:
@@ -115,7 +102,7 @@ def _moduli(axes: Axes, found: Sequence[tuple[int, NDArray[np.complex128]]]) -> 
         for column, (marker, label) in enumerate((("o-", "larger"), ("s--", "smaller"))):
             style: dict[str, Any] = {"color": "0.15" if column == 0 else "0.5", "markersize": 3.5, "linewidth": 1.0}
             axes.plot([t for t, _ in found], moduli[:, column], marker, label=label, **style)
-        axes.set_ylim(0.0, max(1.2, min(1.08 * float(moduli.max()), 1.5 * _FARTHEST)))
+        axes.set_ylim(0.0, max(1.2, min(1.08 * float(moduli.max()), 1.5 * FARTHEST)))
         axes.legend(title="modulus", title_fontsize=9, loc="best")
     axes.xaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=True))
     axes.set(xlabel="timestep", ylabel="modulus of the eigenvalues")

@@ -43,9 +43,7 @@ def draw_formation_error(record: RunRecord, analysis: RunAnalysis, path: str | P
     figure = new_figure(8.0, 1.3 + 2.2 * rows)
     panels = figure.subplots(rows, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axes, follower, found in zip(panels, record.followers, analysis.followers, strict=True):
-        _panel(axes, record, follower, found)
-        axes.set_ylabel("formation error (cm)")
-        axes.grid(axis="y")
+        error_panel(axes, record, follower, found)
         if rows > 1:
             axes.set_title(follower.name.replace("_", " "), loc="left")
     panels[0].set_ylim(bottom=0.0)
@@ -76,7 +74,10 @@ def errors_over_time(own: Track, neighbour: Track, place: Motion) -> tuple[NDArr
     return stamps[known], place_errors_m(own.positions_m[follower, :2], poses, place)
 
 
-def _panel(axes: Axes, record: RunRecord, follower: FollowerRecord, found: FollowerAnalysis) -> None:
+def error_panel(axes: Axes, record: RunRecord, follower: FollowerRecord, found: FollowerAnalysis) -> None:
+    """Draw a follower's formation error over simulated time: centimetres over seconds."""
+    axes.set_ylabel("formation error (cm)")
+    axes.grid(axis="y")
     own, beside = (record.tracks.get(robot) for robot in (follower.name, beacon_neighbour(follower.name)))
     if own is not None and beside is not None and not record.delayed:
         stamps, errors = errors_over_time(own, beside, record.place(follower.name))

@@ -86,12 +86,7 @@ def draw_corrections(record: RunRecord, analysis: RunAnalysis, path: str | Path)
     figure = new_figure(8.0, 1.2 + 2.6 * rows)
     panels = figure.subplots(rows, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axes, follower in zip(panels, analysis.followers, strict=True):
-        timestep_axis(axes, planned_timesteps(record, analysis))
-        correction_bars(axes, follower)
-        axes.set_ylabel("correction distance (cm)")
-        total = follower.totals["correction_m"]
-        said = "" if total is None else f": {total * _CM:.1f} cm from timestep {COLLECTION_TIMESTEPS + 1} on"
-        axes.set_title(f"{follower.name.replace('_', ' ')}{said}", loc="left")
+        corrections_panel(axes, record, analysis, follower)
     highest = max(axes.dataLim.y1 for axes in panels)
     panels[0].set_ylim(0.0, 1.15 * max(highest, 0.1))
     panels[-1].set_xlabel("timestep")
@@ -131,6 +126,16 @@ def trajectory_panel(
     _mark(axes, ends, marker="x", label="lost", color=LOST_COLOUR, markersize=11, markeredgewidth=3.0)
     axes.set(xlabel="x (cm)", ylabel="y (cm)", aspect="equal")
     axes.spines[["top", "right"]].set_visible(True)
+
+
+def corrections_panel(axes: Axes, record: RunRecord, analysis: RunAnalysis, follower: FollowerAnalysis) -> None:
+    """Draw a follower's correction distance in each timestep of a run, centimetres, u on v, with its sum as title."""
+    timestep_axis(axes, planned_timesteps(record, analysis))
+    correction_bars(axes, follower)
+    axes.set_ylabel("correction distance (cm)")
+    total = follower.totals["correction_m"]
+    said = "" if total is None else f": {total * _CM:.1f} cm from timestep {COLLECTION_TIMESTEPS + 1} on"
+    axes.set_title(f"{follower.name.replace('_', ' ')}{said}", loc="left")
 
 
 def correction_bars(axes: Axes, follower: FollowerAnalysis) -> None:

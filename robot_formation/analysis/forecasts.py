@@ -32,6 +32,7 @@ class OneStepForecasts:
         covariances_m2: (n, 2, 2) of the ideal move about the forecast, square metres.
         error_m: n, RMSE, median and largest |error| in metres, share inside the 90 % ellipse; see `error_statistics`.
         horizon: the same of the ways of 1, 2, ... timesteps, with `h`; empty if not asked for.
+        ahead: forecasts of the timesteps after the log's last one: as many as were asked for, at least 1.
         model: K and what is known of it at the log's end; see `model_of`.
     """
 
@@ -40,6 +41,7 @@ class OneStepForecasts:
     covariances_m2: NDArray[np.float64]
     error_m: Mapping[str, float | None]
     horizon: tuple[Mapping[str, float | None], ...] = ()
+    ahead: tuple[Ahead, ...] = ()
     model: Mapping[str, object] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, object]:
@@ -82,12 +84,13 @@ def forecast_log(log: DisplacementLog, parameters: PredictorParameters, horizon:
         except PredictionError as error:
             raise AnalysisError(
                 f"{log.source}, {place}: {error}; correct it, or raise predictor.max_u_m, max_v_m or max_turn_rad "
-                "(read as metres, unless --unit says otherwise, and radians)"
+                "(lengths are metres, or what --unit says; turns are radians)"
             ) from error
     statistics = error_statistics(log.targets_m - means, covariances)
     horizons = tuple({"h": h, **_way_statistics(log, ahead, h)} for h in range(1, horizon + 1))
+    coming = tuple(predictor.ahead(max(horizon, 1)))
     return OneStepForecasts(
-        parameters.name, means, covariances, statistics, horizons, model_of(predictor.diagnostics())
+        parameters.name, means, covariances, statistics, horizons, coming, model_of(predictor.diagnostics())
     )
 
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 150
+FORMATS = (".png", ".svg", ".pdf")
 _GAP = 0.01  # between a legend and the figure's lower edge, share of the figure's height
 # Looks the same where the font is missing; without a salt of its own the names in it are random.
 _SVG: Any = {"svg.fonttype": "path", "svg.hashsalt": "robot_formation"}
@@ -64,10 +65,12 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
     Texts of an SVG become outlines, unless the caller has set matplotlib's svg.hashsalt and chosen.
 
     Raises:
-        AnalysisError: the file can't be written.
+        AnalysisError: the file can't be written, or isn't a .png, .svg or .pdf file.
     """
     from matplotlib import rc_context, rcParams
 
+    if Path(path).suffix.lower() not in FORMATS:
+        raise AnalysisError(f"{path}: pictures are .png, .svg or .pdf files")
     try:
         with rc_context({} if rcParams["svg.hashsalt"] else _SVG):
             # Without the time of day.

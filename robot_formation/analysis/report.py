@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from robot_formation.analysis.conditions import conditions_text, run_facts
@@ -28,9 +28,41 @@ _WIDTHS = (3, 13, 13, 13, 13, 6, 10, 8)
 _NONE = "-"
 
 
-def to_json(analysis: RunAnalysis, said: Mapping[str, object] | None = None) -> str:
-    """Return the analysis in the command line's JSON shape, without NaN; `said` holds further entries."""
-    return json.dumps({**analysis.to_json(), **(said or {})}, indent=2, allow_nan=False)
+def to_json(said: JsonObject) -> str:
+    """Return what is said of a run as the command line prints it, without NaN."""
+    return json.dumps(said, indent=2, allow_nan=False)
+
+
+def run_report(
+    record: RunRecord,
+    analysis: RunAnalysis,
+    *,
+    in_process: bool | None = None,
+    bag: str | Path | None = None,
+    pictures: Sequence[Path] = (),
+    reason: str = "",
+) -> JsonObject:
+    """Return what the command line's JSON says of a run.
+
+    Args:
+        record: the run.
+        analysis: the same run's quantities.
+        in_process: whether it ran in one process; None: unknown.
+        bag: where it is recorded.
+        pictures: that were drawn of it.
+        reason: why it ended before its end.
+    """
+    facts = run_facts(record.details, in_process=in_process)
+    return {**analysis.to_json(), **facts, **ending(bag, pictures, reason)}
+
+
+def ending(bag: str | Path | None, pictures: Sequence[Path], reason: str) -> JsonObject:
+    """List what a run's JSON says of its files, and why it ended before its end."""
+    return {
+        "bag": None if bag is None else str(bag),
+        "pictures": [str(picture) for picture in pictures],
+        "reason": reason or None,
+    }
 
 
 def text_report(record: RunRecord, analysis: RunAnalysis) -> str:

@@ -37,18 +37,16 @@ def draw_sweep(rows: Sequence[RunRow], path: str | Path) -> Path:
     Raises:
         AnalysisError: the file can't be written.
     """
-    groups: dict[tuple[str, str, str], list[RunRow]] = {}
-    for row in rows:
-        groups.setdefault((row.track, row.path, row.surface), []).append(row)
+    groups = sweep_groups(rows)
     predictors = list(dict.fromkeys(row.predictor for row in rows))
     columns = min(_COLUMNS, len(groups))
     lines = -(-len(groups) // columns)
     width = max(3.4, 0.95 * len(predictors) + 1.0)
     figure = new_figure(max(4.8, width * columns), 0.8 + 3.5 * lines)
     panels = figure.subplots(lines, columns, squeeze=False, sharey=True)
-    highest = max((row.correction_m or 0.0 for row in rows if not row.lost), default=0.0) * _CM or 1.0
+    highest = _highest(rows)
     for axes, (group, runs) in zip(panels.flat, groups.items(), strict=False):
-        _panel(axes, runs, predictors, highest)
+        sweep_panel(axes, runs, predictors, highest)
         axes.set_title(_title(group))
     for axes in panels.flat[len(groups) :]:
         axes.set_visible(False)
@@ -61,12 +59,34 @@ def draw_sweep(rows: Sequence[RunRow], path: str | Path) -> Path:
     return save_figure(figure, path)
 
 
+def sweep_groups(rows: Sequence[RunRow]) -> dict[tuple[str, str, str], list[RunRow]]:
+    """Return the runs of each panel, by track, path and surface."""
+    groups: dict[tuple[str, str, str], list[RunRow]] = {}
+    for row in rows:
+        groups.setdefault((row.track, row.path, row.surface), []).append(row)
+    return groups
+
+
+def _highest(rows: Sequence[RunRow]) -> float:
+    """Return the largest correction distance of runs that came to their end, centimetres."""
+    return max((row.correction_m or 0.0 for row in rows if not row.lost), default=0.0) * _CM or 1.0
+
+
 def _title(group: tuple[str, str, str]) -> str:
     track, path, surface = group
     return " · ".join([f"track {track.replace('_', ' ')}", *([path] if path != "straight" else []), surface])
 
 
-def _panel(axes: Axes, runs: Sequence[RunRow], predictors: Sequence[str], highest: float) -> None:
+def sweep_panel(axes: Axes, runs: Sequence[RunRow], predictors: Sequence[str], highest: float | None = None) -> None:
+    """Draw every run's correction distance by predictor, centimetres.
+
+    Args:
+        axes: what to draw into.
+        runs: of one track, path and surface.
+        predictors: in the order of the x axis.
+        highest: distance that has to fit in, centimetres; None: the largest of these runs.
+    """
+    highest = _highest(runs) if highest is None else highest
     by_predictor = {name: {row.seed: row for row in runs if row.predictor == name} for name in predictors}
     seeds = sorted({row.seed for row in runs})
     strip = 1.14 * highest

@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.analysis import markdown
 from robot_formation.json_values import JsonObject
 
 BASELINE = "previous"
@@ -153,26 +154,16 @@ def table(summary: Sequence[JsonObject]) -> str:
     if all(entry["path"] == "straight" for entry in summary):
         named = tuple(name for name in named if name != "path")
     heads = (*named, "correction [cm]", "reduction [%]", "RMSE [cm]", "moves per step", "in 90 % ellipse [%]")
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    rows = []
     for entry in summary:
         coverage = entry["prediction_coverage_90"]
-        cells = [
+        row = [
             *(str(entry[name]) for name in named),
-            _cell(entry["correction_m"], 100.0),
-            _cell(entry["reduction"], 100.0, 0),
-            _cell(entry["formation_error_rmse_m"], 100.0, 2),
-            _cell(entry["movements_per_timestep"], 1.0, 2),
+            markdown.interval(entry["correction_m"], 100.0),
+            markdown.interval(entry["reduction"], 100.0, 0),
+            markdown.interval(entry["formation_error_rmse_m"], 100.0, 2),
+            markdown.interval(entry["movements_per_timestep"], 1.0, 2),
             "-" if coverage is None else f"{100.0 * coverage:.0f}",
         ]
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
-def _cell(value: dict[str, float | None] | None, scale: float, digits: int = 1) -> str:
-    if value is None:
-        return "-"
-    middle, low, high = (
-        "lost" if number is None else f"{scale * number:.{digits}f}"
-        for number in (value["median"], value["low"], value["high"])
-    )
-    return f"{middle} ({low}..{high})"
+        rows.append(row)
+    return "\n".join(markdown.table(heads, rows))

@@ -15,7 +15,7 @@ from robot_formation.bag.run_details import value
 from robot_formation.json_values import JsonObject
 from robot_formation.system.files import size_text
 
-_DETAILS = ("scenario", "seed", "predictor", "surface", "git_commit", "dropped", "lost")
+_DETAILS = ("scenario", "seed", "predictor", "surface", "stand_ins", "git_commit", "dropped", "lost")
 _EARLIEST_DATE_NS = 10**18  # September 2001: no clock of a ROS robot that was set has shown an earlier date
 
 

@@ -53,6 +53,12 @@ def said_slots(details: Mapping[str, str]) -> list[tuple[float, float]]:
     return [(float(lateral_m), float(ahead_m)) for lateral_m, ahead_m in found]
 
 
+def stand_ins(details: Mapping[str, str]) -> list[str]:
+    """Read which nodes somebody else had started, like 'follower_1/block_detector'; empty where it is not said."""
+    found = value(details.get("stand_ins", ""))
+    return [name for name in found if isinstance(name, str)] if isinstance(found, list) else []
+
+
 def whole_number(details: Mapping[str, str], key: str, digits: int) -> int | None:
     """Read a number from 0 with at most so many digits; None where it is missing or something else."""
     text = details.get(key, "")

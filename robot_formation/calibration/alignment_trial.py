@@ -31,7 +31,6 @@ from robot_formation.world.events import Frame, JointStates, RobotPose
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
 from robot_formation.world.start import RobotStart
-from robot_formation.world.world import World
 
 FOLLOWER = names.follower(1)
 HEADING_RAD = math.pi / 2.0
@@ -116,6 +115,8 @@ class AlignmentTrial:
         tamper: Callable[[SeenFrame], Sequence[SeenFrame]] | None = None,
         spoil: Callable[[Picture, int], Picture] | None = None,
     ) -> None:
+        from robot_formation.world.world import World  # needs PyBullet, the rest of this file doesn't
+
         self._world = World(equipment.surface, poses(equipment.surface, start), equipment.world, seed=seed)
         self._drive = Drive(equipment.drive)
         self._detector = BlockDetector(equipment.detector.load(), equipment.detector)

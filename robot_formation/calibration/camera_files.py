@@ -15,7 +15,7 @@ from robot_formation.calibration.camera_edge_bias import edge_biases
 from robot_formation.calibration.camera_fit import face_views, fit_camera
 from robot_formation.calibration.camera_grid import Conditions, true_faces
 from robot_formation.calibration.camera_report import VisionResult
-from robot_formation.calibration.camera_run import BAG_NAME, record_of, write_bag
+from robot_formation.calibration.camera_run import BAG_NAME, record_of
 from robot_formation.calibration.camera_samples import CameraSample
 from robot_formation.follower.camera_calibration_file import VisionCalibration, save_vision
 
@@ -51,6 +51,8 @@ def evaluate(
     """
     bag = folder / BAG_NAME
     if not bag.exists():
+        from robot_formation.calibration.camera_bag import write_bag  # the only part that needs ROS
+
         shutil.rmtree(bag.with_name(BAG_NAME + PARTIAL_SUFFIX), ignore_errors=True)  # of a run that was stopped
         metadata = {"calibration": "vision", "conditions": json.dumps(record_of(conditions, step_m))}
         write_bag(bag, samples, conditions, metadata)

@@ -41,10 +41,9 @@ def run(args: argparse.Namespace) -> int:
         FormationError: the bag can't be read or has no run, or the pictures can't be written.
     """
     # Imported here, so that the other verbs don't pay for rosbags.
-    from robot_formation.analysis.conditions import run_facts
     from robot_formation.analysis.from_bag import load_run
     from robot_formation.analysis.quantities import analyse
-    from robot_formation.analysis.report import pictures_folder, text_report, to_json, write_pictures
+    from robot_formation.analysis.report import pictures_folder, run_report, text_report, to_json, write_pictures
 
     record = load_run(args.bag, args.namespace)
     analysis = analyse(record)
@@ -56,8 +55,7 @@ def run(args: argparse.Namespace) -> int:
         folder = args.out or pictures_folder(args.bag)
         pictures = write_pictures(record, analysis, folder, args.format, overhead=args.overhead)
     if args.json:
-        files = {"bag": str(args.bag), "pictures": [str(picture) for picture in pictures]}
-        print(to_json(analysis, {**run_facts(record.details), **files, "reason": None}))
+        print(to_json(run_report(record, analysis, bag=args.bag, pictures=pictures)))
     elif pictures:
         print("\npictures: " + ", ".join(str(picture) for picture in pictures))
     return 0

@@ -52,6 +52,7 @@ def run_vision(args: argparse.Namespace) -> int:
     from robot_formation.calibration.camera_grid import positions
     from robot_formation.calibration.camera_run import BAG_NAME, record_of
     from robot_formation.calibration.camera_table import RECORD_NAME, TABLE_NAME, VisionTable
+    from robot_formation.extras import require
 
     if args.jobs < 1:
         raise FormationError(f"--jobs is at least 1, not {args.jobs}")
@@ -62,6 +63,8 @@ def run_vision(args: argparse.Namespace) -> int:
     if args.force:
         drawn = [path.name for kind in FORMATS for path in picture_paths(folder, kind).values()]
         _clear(folder, (RECORD_NAME, TABLE_NAME, CALIBRATION_FILE, *drawn, BAG_NAME))
+    if not (folder / BAG_NAME).exists():
+        require("ros")  # to write it
     table = VisionTable(folder, record_of(conditions, args.step), places)
     try:
         _look(table, places, conditions, args.jobs)

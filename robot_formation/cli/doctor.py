@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
                 print(f"  {name:<24} {'-' if value is None else value}")
     if missing:
         installs = any("installed" in text or "imported" in text for text in missing)
-        hint = " (./formation in a checkout installs everything)" if installs else ""
+        hint = " (to install: pip install 'robot_formation[sim,ros]', or ./formation in a checkout)" if installs else ""
         print(f"formation doctor: a run cannot start: {'; '.join(missing)}{hint}", file=sys.stderr)
         return 2
     return 0

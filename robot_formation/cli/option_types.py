@@ -37,6 +37,7 @@ number = option_type(float, math.isfinite, "a number")
 positive_whole = option_type(int, lambda value: value >= 1, "a whole number above zero")
 port = option_type(int, lambda value: 0 <= value <= 65535, "a port, 0 to 65535")
 positive = option_type(float, lambda value: 0.0 < value < 1e9, "a number above 0")
+seconds = option_type(float, lambda value: 0.0 < value <= 86400.0, "a number of seconds, above 0, a day at most")
 
 
 def whole_numbers(count: int) -> Callable[[str], tuple[int, ...]]:

@@ -65,8 +65,11 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments or the folder, or if something can't be measured.
     """
-    from robot_formation.paper.work import Work, carry_out_work
+    from robot_formation.extras import require
     from robot_formation.paths import default_bags_dir
+
+    require("ros", "sim")
+    from robot_formation.paper.work import Work, carry_out_work
 
     folder = args.out or default_bags_dir() / "paper"
     work = Work(folder, args.seeds, args.repeats, args.step, tuple(args.set), args.jobs)

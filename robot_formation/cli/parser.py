@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -49,6 +50,8 @@ class Parser(argparse.ArgumentParser):
 
         Without any argument, a parser that waits for a verb prints its help and ends with exit code 0.
         """
+        if "_ARGCOMPLETE" in os.environ:  # words that a shell wants completed: they need not make sense yet
+            return super().parse_known_args(args, namespace)
         words = sys.argv[1:] if args is None else list(args)
         if self._subparsers is not None and not words:
             self.print_help()

@@ -65,9 +65,9 @@ def run(args: argparse.Namespace) -> int:
         raise FormationError(f"--rate is {args.rate:g}, but must be above 0: 2 plays twice as fast, 0.5 at half speed")
     from robot_formation.bag.reader import read_bag
     from robot_formation.bag.selection import Selection
-    from robot_formation.network.shared_memory_space import require_space
+    from robot_formation.network.loading_ros import require_ros
 
-    require_space()  # before ROS is loaded
+    require_ros()  # before it is loaded
     selection = Selection(args.topics, args.regex, args.exclude)
     with read_bag(args.bag) as bag:
         if bag.recovered:

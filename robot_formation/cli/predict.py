@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robot_formation import names
+from robot_formation.analysis.limits import FARTHEST
 from robot_formation.analysis.style import FORMATS
 from robot_formation.cli.option_types import Names
 from robot_formation.cli.parser import Subparsers
@@ -29,8 +30,6 @@ to go at the end), commanded_u_m and commanded_v_m (the displacement if the robo
 """
 _DRAWN = ("previous", "measured", "formation")
 """What the picture shows if no predictors are named."""
-_FARTHEST = 50
-"""Most timesteps ahead."""
 _LONG = 20_000
 """Rows from which on a predictor takes long enough to be announced."""
 
@@ -69,7 +68,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="H",
         type=_horizon,
         default=0,
-        help=f"judge forecasts of the ways of 1 to H timesteps too (up to {_FARTHEST})",
+        help=f"judge forecasts of the ways of 1 to H timesteps too (up to {FARTHEST})",
     )
     parser.add_argument(
         "--columns",
@@ -106,8 +105,9 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from robot_formation.analysis.forecasts import best_of, error_table, forecast_log
+    from robot_formation.experiment.predictor_choice import predictors_of_texts
 
-    chosen = predictors(args.predictors, args.set)
+    chosen = predictors_of_texts(args.predictors, args.set)
     log = read(args, chosen[0])
     forecasts = []
     for parameters in chosen:
@@ -125,31 +125,6 @@ def run(args: argparse.Namespace) -> int:
     if written:
         print("\n" + "\n".join(f"{label}: {path}" for label, path in written))
     return 0
-
-
-def predictors(chosen: Sequence[str], settings: Sequence[str]) -> list[PredictorParameters]:
-    """Return each predictor's parameters: the defaults, then the settings.
-
-    Raises:
-        FormationError: naming what is misspelt, out of range or of another node.
-    """
-    from robot_formation.experiment.scenario import build, override
-    from robot_formation.experiment.scenario_setup import Setup
-    from robot_formation.koopman.predictors import NAMES, check_predictor_name
-    from robot_formation.parameters import ParameterError
-
-    for name in chosen:
-        try:
-            check_predictor_name(name)
-        except ParameterError as error:
-            raise FormationError(f"--predictors: {error}") from None
-    scenario = override(build(Setup(), {}), settings)
-    for setting in settings:
-        if not setting.startswith("predictor."):
-            raise FormationError(f"--set {setting}: a log has no scenario; set parameters like predictor.forgetting")
-    if "name" in scenario.settings.get("predictor", {}):
-        raise FormationError("--set predictor.name: name predictors by --predictors NAME,...")
-    return [replace(scenario.predictor, name=name) for name in dict.fromkeys(chosen or NAMES)]
 
 
 def read(args: argparse.Namespace, parameters: PredictorParameters) -> DisplacementLog:
@@ -268,8 +243,8 @@ def _warn_of_bounds(log: DisplacementLog, parameters: PredictorParameters) -> No
 
 def _horizon(text: str) -> int:
     """An argparse type for a number of timesteps."""
-    if not text.isdecimal() or not 1 <= int(text) <= _FARTHEST:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of timesteps from 1 to {_FARTHEST}")
+    if not text.isdecimal() or not 1 <= int(text) <= FARTHEST:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of timesteps from 1 to {FARTHEST}")
     return int(text)
 
 

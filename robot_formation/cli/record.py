@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robot_formation.cli.bag_options import MIB, add_split, split_bytes
 from robot_formation.cli.messages import say, warn
 from robot_formation.cli.option_types import positive
 from robot_formation.cli.parser import Subparsers
@@ -23,7 +24,6 @@ Record topics of the ROS graph (ROS_DOMAIN_ID and the like count) into an MCAP b
 later are recorded too. The folder is called DIR.partial until the bag is closed; 'formation recover' completes one
 whose recorder was killed.
 """
-_MIB = 1 << 20
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -39,10 +39,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder of the bag (default: a new one in bags/)")
     parser.add_argument("--compression", choices=("zstd", "none"), default="zstd", help="of the chunks (default: zstd)")
     parser.add_argument("--chunk-size", metavar="MIB", type=positive, default=1.0, help="of a chunk (default: 1)")
-    parser.add_argument("--max-size", metavar="MIB", type=positive, default=0.0, help="begin a new file after so much")
-    parser.add_argument(
-        "--max-duration", metavar="S", type=positive, default=0.0, help="begin a new file after so long"
-    )
+    add_split(parser)
     parser.add_argument(
         "--queue-size",
         metavar="MIB",
@@ -70,9 +67,9 @@ def run(args: argparse.Namespace) -> int:
         raise FormationError("say what to record: topics, --regex, or --all alone")
     from robot_formation.bag.bag_path import PathReservation, check_free
     from robot_formation.bag.selection import Selection
-    from robot_formation.network.shared_memory_space import require_space
+    from robot_formation.network.loading_ros import require_ros
 
-    require_space()  # before ROS is loaded
+    require_ros()  # before it is loaded
     Selection(args.topics, args.regex, args.exclude or "")  # a bad expression is told before ROS is loaded
     with PathReservation(args.out) if args.out else default_bag() as place:
         check_free(place.path)
@@ -121,10 +118,10 @@ def _parameters(args: argparse.Namespace, path: Path, metadata: tuple[str, ...])
         "images": not args.no_images,
         "time": args.time,
         "compression": args.compression,
-        "chunk_bytes": round(args.chunk_size * _MIB),
-        "split_bytes": round(args.max_size * _MIB),
+        "chunk_bytes": round(args.chunk_size * MIB),
+        "split_bytes": split_bytes(args),
         "split_s": args.max_duration,
-        "queue_bytes": round(args.queue_size * _MIB),
+        "queue_bytes": round(args.queue_size * MIB),
         "metadata": metadata,
     }
     if args.exclude is not None:

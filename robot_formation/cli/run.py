@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robot_formation import exit_codes
-from robot_formation.cli.option_types import number, port, whole_number
+from robot_formation.cli.bag_options import add_split, split_bytes, split_ns
+from robot_formation.cli.option_types import number, port, seconds, whole_number
 from robot_formation.cli.parser import Subparsers
 from robot_formation.cli.picture_format import add_format
 from robot_formation.errors import FormationError
@@ -60,6 +61,7 @@ def add_parser(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--bag", metavar="PATH", type=Path, help="folder of the bag (default: a new one in bags/)")
     parser.add_argument("--images", action="store_true", help="record pictures too (126 MB per thousand)")
+    add_split(parser)
     parser.add_argument(
         "--real-time-factor", metavar="X", type=number, help="0: as fast as possible (default), 1: real time"
     )
@@ -69,6 +71,17 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument("--view", action="store_true", help="show the run in 3-D in a browser of this machine")
     parser.add_argument("--view-port", metavar="N", type=port, help="port of --view (default: 8080; 0: any free one)")
     parser.add_argument("--in-process", action="store_true", help="the same run in one process, without ROS middleware")
+    parser.add_argument(
+        "--without",
+        metavar="NODE",
+        action="append",
+        default=[],
+        help="don't start this node, but wait for one of its name that you start: block_detector (that of every "
+        "follower), follower_2/block_detector, ...; may be repeated",
+    )
+    parser.add_argument(
+        "--stand-in-timeout", metavar="S", type=seconds, help="how long to wait for such nodes (default: 300)"
+    )
     add_format(parser)
     parser.add_argument(
         "--json", action="store_true", help="print JSON and nothing else on standard output; no pictures"
@@ -82,11 +95,17 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         FormationError: on anything wrong in the arguments, before anything is started.
     """
+    from robot_formation.experiment.stand_ins import WORLD_NODE
+    from robot_formation.extras import require
     from robot_formation.network.shared_memory import TracingFiles
+    from robot_formation.network.shared_memory_space import require_space
 
     tracing = TracingFiles()  # before anything of ROS is loaded
     try:
         scenario = build_scenario(args)
+        check_stand_ins(args, scenario)
+        require("ros", *(() if WORLD_NODE in args.without else ("sim",)))
+        require_space()
         check_view(args)
         with reserve(args, scenario) as place:
             result = execute(args, scenario, place)
@@ -127,21 +146,11 @@ def build_scenario(args: argparse.Namespace) -> Scenario:
         FormationError: naming what is misspelt or out of range.
     """
     from robot_formation.experiment import scenario as scenarios
+    from robot_formation.experiment.choices import choose
 
     file, track = args.scenario, "two" if args.track is None else args.track
     scenario = scenarios.load(file) if file is not None else scenarios.load_track(track)
-    if args.surface is not None:
-        scenario = scenarios.with_surface(scenario, args.surface)
-    for option, key, value in (
-        ("--path", "leader.path", args.path),
-        ("--predictor", "predictor.name", args.predictor),
-        ("--seed", "seed", args.seed),
-        ("--schedule", "schedule", args.schedule),
-        ("--camera", "world.camera.mode", args.camera),
-        ("--real-time-factor", "world.real_time_factor", args.real_time_factor),
-    ):
-        if value is not None:
-            scenario = scenarios.with_option(scenario, key, value, option)
+    scenario = choose(scenario, vars(args), lambda name: f"--{name.replace('_', '-')}")
     scenario = scenarios.override(scenario, args.set)
     scenario.check()
     return scenario
@@ -163,6 +172,21 @@ def check_view(args: argparse.Namespace) -> None:
         args.view_port = check_viewer(DEFAULT_PORT if args.view_port is None else args.view_port)
 
 
+def check_stand_ins(args: argparse.Namespace, scenario: Scenario) -> None:
+    """Check which nodes somebody else starts; `without` then has the name of each.
+
+    Raises:
+        FormationError: there is no such node, or the run has no nodes at all.
+    """
+    from robot_formation.experiment.stand_ins import stand_ins_of
+
+    if args.without and args.in_process:
+        raise FormationError("--without leaves out a node of the graph, and --in-process has none; give one of them")
+    if args.stand_in_timeout is not None and not args.without:
+        raise FormationError("--stand-in-timeout is how long to wait for the nodes of --without; give that too")
+    args.without = stand_ins_of(scenario, args.without, "--without")
+
+
 def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
     """Reserve the bag's path: as asked for, else a new name after the run and the time."""
     from robot_formation.bag.bag_path import PathReservation, reserve_new
@@ -176,6 +200,7 @@ def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
 
 def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation) -> RunResult:
     """Run the scenario in the way that the options ask for."""
+    from robot_formation.bag.writer import WriteOptions
     from robot_formation.calibration.camera_check import describe_camera
     from robot_formation.calibration.drive_check import describe_curves
     from robot_formation.experiment.overhead_defaults import LARGEST_M
@@ -188,35 +213,50 @@ def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation
         say(camera)
     if scenario.too_large_for_overhead:
         say(f"overhead camera: off, for the plate is larger than {LARGEST_M:g} m; world.overhead.* arranges one")
+    options = WriteOptions(split_bytes=split_bytes(args), split_ns=split_ns(args))
     if args.in_process:
         from robot_formation.experiment.in_process import run_in_process
+        from robot_formation.experiment.one_process import check_one_process
         from robot_formation.launching.processes import run_metadata
 
-        if scenario.world.real_time_factor > 0.0:
-            raise FormationError("--in-process runs as fast as it can; leave --real-time-factor out")
-        if scenario.leader.path == "teleop":
-            raise FormationError("--path teleop is driven over ROS topics; leave --in-process out")
+        check_one_process(scenario)
         return run_in_process(
-            scenario, place.path, run_metadata(scenario), images=args.images, say=say, reservation=place
+            scenario,
+            place.path,
+            run_metadata(scenario),
+            images=args.images,
+            options=options,
+            say=say,
+            reservation=place,
         )
+    from robot_formation.experiment.stand_ins import TIMEOUT_S
     from robot_formation.launching.launcher import Launcher
 
-    view_port = args.view_port if args.view else None
-    return Launcher(scenario, place.path, args.images, say, reservation=place, view_port=view_port).run()
+    return Launcher(
+        scenario,
+        place.path,
+        args.images,
+        say,
+        options=options,
+        reservation=place,
+        view_port=args.view_port if args.view else None,
+        stand_ins=args.without,
+        stand_in_timeout_s=TIMEOUT_S if args.stand_in_timeout is None else args.stand_in_timeout,
+    ).run()
 
 
 def report(args: argparse.Namespace, result: RunResult) -> None:
     """Print the analysis of the run's bag."""
-    from robot_formation.analysis.conditions import run_facts
     from robot_formation.analysis.from_bag import load_run
     from robot_formation.analysis.quantities import analyse
-    from robot_formation.analysis.report import text_report, to_json, write_pictures
+    from robot_formation.analysis.report import run_report, text_report, to_json, write_pictures
 
     assert result.bag is not None  # checked by the caller
     record = load_run(result.bag)
     analysis = analyse(record)
     if args.json:
-        print(to_json(analysis, {**run_facts(record.details, in_process=args.in_process), **_ending(result)}))
+        said = run_report(record, analysis, in_process=args.in_process, bag=result.bag, reason=result.reason)
+        print(to_json(said))
         return
     print(text_report(record, analysis))
     if result.exit_code == exit_codes.INTERRUPTED:  # whoever interrupts wants to leave
@@ -230,22 +270,14 @@ def report(args: argparse.Namespace, result: RunResult) -> None:
 def cut_off_json(args: argparse.Namespace, scenario: Scenario, result: RunResult) -> str:
     """Return the JSON of a run that left nothing to analyse: what it was to be, and why it ended."""
     from robot_formation.analysis.conditions import run_facts
+    from robot_formation.analysis.report import ending
     from robot_formation.launching.processes import run_metadata
 
-    facts = run_facts(run_metadata(scenario), in_process=args.in_process)
+    facts = run_facts(run_metadata(scenario, args.without), in_process=args.in_process)
     nothing: JsonObject = {
         "scenario": scenario.setup.name,
         "outcome": "incomplete",
         "timesteps": [],
         "totals": None,
     }
-    return json.dumps({**nothing, **facts, **_ending(result)}, indent=2)
-
-
-def _ending(result: RunResult) -> JsonObject:
-    """List what a run's JSON says of its files, and why it ended before its end."""
-    return {
-        "bag": None if result.bag is None else str(result.bag),
-        "pictures": [],
-        "reason": result.reason or None,
-    }
+    return json.dumps({**nothing, **facts, **ending(result.bag, (), result.reason)}, indent=2)

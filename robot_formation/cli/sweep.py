@@ -8,7 +8,6 @@ import os
 import re
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,6 @@ from robot_formation.cli.option_types import Names, whole_number
 from robot_formation.cli.parser import Subparsers
 from robot_formation.cli.picture_format import add_format
 from robot_formation.errors import FormationError
-from robot_formation.json_values import JsonObject
 
 if TYPE_CHECKING:
     from robot_formation.bag.bag_path import PathReservation
@@ -31,11 +29,6 @@ paired over seeds. The table of runs grows in OUT/runs.csv; a sweep that was sto
 is given again. Besides the predictors of 'formation list', 'ideal' and 'ideal+close' show the noise floor: the same
 controller, commanded the ideal move.
 """
-SUMMARY_NAME = "summary.json"
-TABLE_NAME = "summary.md"
-PICTURE_NAME = "corrections"
-FEW_SEEDS = 5
-"""Of n seeds, the whole range of values covers the median with a probability of 1 - 2**(1 - n): 94 % for five."""
 MOST_SEEDS = 1_000_000
 _REMEDY = "the same command with this --out goes on, also without what failed"
 
@@ -78,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
         FormationError: on anything wrong in the arguments or the folder, before anything is run.
     """
     from robot_formation.experiment import sweep
+    from robot_formation.extras import require
 
     plan = sweep.Plan(
         args.tracks, args.surfaces, args.predictors, seeds(",".join(args.seeds)), tuple(args.set), args.paths
@@ -85,6 +79,7 @@ def run(args: argparse.Namespace) -> int:
     if args.jobs < 1:
         raise FormationError(f"--jobs is at least 1, not {args.jobs}")
     plan.check()
+    require("dask") if args.dask else require("ros", "sim")
     if args.out is not None:
         return _sweep(args, plan, args.out)
     with default_folder() as place:
@@ -92,26 +87,33 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
-    from robot_formation.analysis.sweep_figure import draw_sweep
-    from robot_formation.analysis.sweep_summary import summarise, table
-    from robot_formation.experiment import sweep
+    from robot_formation.analysis.sweep_summary import summarise
+    from robot_formation.experiment import sweep, sweep_runs
+    from robot_formation.experiment.sweep_results import (
+        SUMMARY_NAME,
+        announcements,
+        sweep_report,
+        sweep_text,
+        write_results,
+    )
 
     results = sweep.Table(folder, plan)
-    _announce(plan)
+    for line in announcements(plan):
+        print(line, file=sys.stderr)
     tasks = sweep.remaining(plan, results.rows)
     done = len(results.rows)
     if tasks:
         if done:
             print(f"{folder}: {done} runs are there already, {len(tasks)} are left", file=sys.stderr)
         rows = (
-            sweep.carry_out_by_dask(tasks, plan.settings, args.dask)
+            sweep_runs.carry_out_by_dask(tasks, plan.settings, args.dask)
             if args.dask
-            else sweep.carry_out(tasks, plan.settings, min(args.jobs, len(tasks)))
+            else sweep_runs.carry_out(tasks, plan.settings, min(args.jobs, len(tasks)))
         )
         try:
             for row in with_progress(rows, len(tasks)):
                 results.add(row)
-        except sweep.FailedRunsError as error:
+        except sweep_runs.FailedRunsError as error:
             for line in error.lines:
                 print(f"formation sweep: {line}", file=sys.stderr)
             print(f"formation sweep: {len(results.rows)} runs are in {folder}; {_REMEDY}", file=sys.stderr)
@@ -121,67 +123,13 @@ def _sweep(args: argparse.Namespace, plan: Plan, folder: Path) -> int:
             return exit_codes.INTERRUPTED
     rows_now = sweep.chosen(plan, results.rows)
     summary = summarise(rows_now)
-    said = {"summary": summary, **_facts(plan)}
-    shown = f"{table(summary)}\n\n{_conditions_text(plan)}"
-    (folder / SUMMARY_NAME).write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
-    (folder / TABLE_NAME).write_text(shown + "\n", encoding="utf-8")
-    picture = draw_sweep(rows_now, folder / f"{PICTURE_NAME}.{args.format}")
+    picture = write_results(folder, plan, rows_now, summary, args.format)
     if args.json:
-        # No run is recorded; all came to an end.
-        files: JsonObject = {"bag": None, "pictures": [str(picture)], "reason": None}
-        print(json.dumps({"runs": str(folder / sweep.RUNS_NAME), **said, **files}, indent=2))
+        print(json.dumps(sweep_report(plan, summary, folder, [picture]), indent=2))
     else:
-        print(shown)
+        print(sweep_text(plan, summary))
         print(f"\nruns: {folder / sweep.RUNS_NAME}\nsummary: {folder / SUMMARY_NAME}\npicture: {picture}")
     return exit_codes.DONE
-
-
-def _facts(plan: Plan) -> JsonObject:
-    """List what was run, for the JSON."""
-    return {
-        "tracks": list(plan.tracks),
-        "paths": list(plan.paths),
-        "surfaces": list(plan.surfaces),
-        "predictors": list(plan.predictors),
-        "seeds": list(plan.seeds),
-        "settings": list(plan.settings),
-        "conditions": plan.conditions(),
-    }
-
-
-def _conditions_text(plan: Plan) -> str:
-    """Describe under what conditions all runs were made: others give other figures."""
-    from robot_formation.analysis.conditions import conditions_text
-
-    settings = f"; {', '.join(plan.settings)}" if plan.settings else ""
-    return f"Conditions: {conditions_text(plan.conditions())}, in one process; {seeds_text(plan.seeds)}{settings}"
-
-
-def _announce(plan: Plan) -> None:
-    """Print to standard error which seeds are run, and if they are too few."""
-    print(seeds_text(plan.seeds), file=sys.stderr)
-    if len(plan.seeds) < FEW_SEEDS:
-        text = f"warning: intervals say nothing with fewer than {FEW_SEEDS} seeds; 20 are --seeds 0:20"
-        print(text, file=sys.stderr)
-    turning = [path for path in plan.paths if plan.turns_unfollowed(path)]
-    if turning:
-        text = f"warning: {', '.join(turning)} turns, which mode paper can't follow: --set fine_tuner.mode=precise"
-        print(text, file=sys.stderr)
-
-
-def seeds_text(chosen: Sequence[int]) -> str:
-    """Describe seeds in words: '1 seed: 5', 'seeds 0 to 4 (5 seeds)', 'seeds 0 to 2, 7 (4 seeds)'."""
-    if len(chosen) == 1:
-        return f"1 seed: {chosen[0]}"
-    ranges: list[list[int]] = []
-    for seed in sorted(chosen):
-        if ranges and seed == ranges[-1][-1] + 1:
-            ranges[-1][1:] = [seed]
-        else:
-            ranges.append([seed])
-    said = [" to ".join(map(str, ends)) for ends in ranges]
-    shown = said if len(said) <= 10 else [*said[:9], f"... {said[-1]}"]
-    return f"seeds {', '.join(shown)} ({len(chosen)} seeds)"
 
 
 def seeds(text: str) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from robot_formation.cli.parser import Parser
 from robot_formation.errors import FormationError
@@ -16,7 +17,9 @@ from robot_formation.paths import project_root
 
 _MOST_WORKERS = 4  # the tests of the node graph start a dozen processes each
 _SLOWEST = 20
-_QUICK = ("-m", "not graph and not slow")
+_TIMEOUT_S = 600  # for each test; on a busy machine mypy takes minutes
+_QUICK = ("-m", "not graph and not slow and not long")
+_DEFAULT = ("-m", "not long")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Parser]) -> None:
@@ -25,12 +28,17 @@ def add_parser(subparsers: argparse._SubParsersAction[Parser]) -> None:
         "test",
         help="run the project's tests",
         description="Runs the project's tests with pytest, spread over the cores, and lists the slowest. Arguments "
-        "after -- go to pytest too, for instance: formation test -- -k predictor -x",
+        "after -- go to pytest too, for instance: formation test -- -k predictor -x. A test that hangs fails after "
+        f"{_TIMEOUT_S // 60} minutes.",
     )
-    parser.add_argument(
+    extent = parser.add_mutually_exclusive_group()
+    extent.add_argument(
         "--quick",
         action="store_true",
         help="leave out what starts processes or takes long: the linters, the layers and the core's tests remain",
+    )
+    extent.add_argument(
+        "--all", action="store_true", help="leave out nothing; the default leaves out the tests marked long"
     )
     parser.add_argument("pytest_arguments", nargs="*", metavar="PYTEST_ARGUMENT", help="after --: handed to pytest")
     parser.unknown_hint = "; arguments of pytest come after --, like: formation test -- -k predictor"
@@ -52,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
         raise FormationError("the tests are part of the source, which this install lacks: run ./formation test there")
     if importlib.util.find_spec("pytest") is None:
         raise FormationError(f"pytest is not installed: pip install -e '{root}[test]'")
-    arguments = [*(_QUICK if args.quick else ()), *args.pytest_arguments]
-    command = [sys.executable, "-m", "pytest", f"--durations={_SLOWEST}", *_spread(arguments), *arguments]
+    arguments = [*_extent(args, root), *args.pytest_arguments]
+    command = [sys.executable, "-m", "pytest", f"--durations={_SLOWEST}", *_limits(), *_spread(arguments), *arguments]
     with subprocess.Popen(command, cwd=root) as process:
         try:
             return process.wait()
@@ -61,6 +69,27 @@ def run(args: argparse.Namespace) -> int:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             process.wait()
             return 130
+
+
+def _extent(args: argparse.Namespace, root: Path) -> Sequence[str]:
+    """Arguments that say which tests are run; tests whose file is given are run however long they take."""
+    if args.quick:
+        return _QUICK
+    named = any(_is_test_file(root, argument) for argument in args.pytest_arguments)
+    return () if args.all or named else _DEFAULT
+
+
+def _is_test_file(root: Path, argument: str) -> bool:
+    """Return whether an argument of pytest names a file of tests, or a test in one; options' values don't count."""
+    name = argument.partition("::")[0]
+    return name.endswith(".py") and (root / name).is_file()
+
+
+def _limits() -> list[str]:
+    """Arguments that end a test that hangs."""
+    import importlib.util
+
+    return [] if importlib.util.find_spec("pytest_timeout") is None else [f"--timeout={_TIMEOUT_S}"]
 
 
 def _spread(arguments: Sequence[str]) -> list[str]:

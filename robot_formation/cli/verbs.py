@@ -7,6 +7,7 @@ from robot_formation.cli import (
     animate,
     calibrate,
     compare,
+    completion,
     detect,
     doctor,
     info,
@@ -20,6 +21,7 @@ from robot_formation.cli import (
     replay,
     report,
     run,
+    score,
     sweep,
     teach,
     test,
@@ -27,7 +29,7 @@ from robot_formation.cli import (
 )
 
 VERBS = (
-    *(run, sweep, paper, list_, analyze, compare, report, view, animate),
+    *(run, sweep, score, paper, list_, analyze, compare, report, view, animate),
     *(path, predict, record, play, info, recover, replay),
-    *(calibrate, teach, detect, doctor, test),
+    *(calibrate, teach, detect, doctor, completion, test),
 )

@@ -52,7 +52,8 @@ class Component:
 
     A component that has finished sets `exit_code`; its host then ends with it. One that has failed, but stays for the
     sake of the others, sets `held_code`, with which its host ends when the run does. A host that reports health gives a
-    `wall_clock` (seconds, from any origin), to measure how long work takes and for nothing else.
+    `wall_clock` (seconds, from any origin), to measure how long work takes and for nothing else. One that knows that
+    nobody will ever hear some outputs says so by `wanted(topic)`; what is costly to make isn't made for them.
     """
 
     fixed: ClassVar[Mapping[str, str]] = {"*": "a run's results rest on it from the start on"}
@@ -68,6 +69,7 @@ class Component:
         self.held_reason = ""
         self.stamp_ns = 0
         self.wall_clock: Callable[[], float] | None = None
+        self.wanted: Callable[[Topic], bool] = lambda topic: True
         self._send: Callable[[Topic, Message], None] = _not_attached
         self._say: Callable[[int, str], None] = lambda level, text: None
         self._warnings = 0

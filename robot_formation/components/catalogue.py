@@ -36,9 +36,6 @@ class ComponentClass(Protocol[_P]):
         """Make the component."""
 
 
-Classes = tuple[type[P], ComponentClass[P]]
-
-
 class Robots(Choice):
     """Which robots have a node of a kind; none: there is one for the whole run."""
 
@@ -55,21 +52,15 @@ class NodeKind(Generic[P]):
     Attributes:
         name: of the executable, and of its section in a scenario.
         robots: which robots have one.
-        classes: imports and returns the classes of its parameters and of its component. Imported when asked for: no
-            node pays for another's libraries.
+        parameter_class: imports and returns the class of its parameters, which needs neither ROS nor PyBullet.
+        component_class: imports and returns the class of its component. Imported when asked for: no node pays for
+            another's libraries.
     """
 
     name: str
     robots: Robots
-    classes: Callable[[], Classes[P]]
-
-    def parameter_class(self) -> type[P]:
-        """Import the parameters' class."""
-        return self.classes()[0]
-
-    def component_class(self) -> ComponentClass[P]:
-        """Import the component's class."""
-        return self.classes()[1]
+    parameter_class: Callable[[], type[P]]
+    component_class: Callable[[], ComponentClass[P]]
 
     def robots_of(self, followers: int) -> list[str]:
         """List the robots that have this node; [''] for a node of the run's own."""
@@ -82,63 +73,98 @@ class NodeKind(Generic[P]):
         }[self.robots]
 
 
-def _world() -> Classes[WorldNodeParameters]:
+def _world_parameters() -> type[WorldNodeParameters]:
     from robot_formation.components.node_parameters import WorldNodeParameters
+
+    return WorldNodeParameters
+
+
+def _world_component() -> ComponentClass[WorldNodeParameters]:
     from robot_formation.components.world import WorldComponent
 
-    return WorldNodeParameters, WorldComponent
+    return WorldComponent
 
 
-def _overhead_tracker() -> Classes[OverheadTrackerNodeParameters]:
+def _overhead_tracker_parameters() -> type[OverheadTrackerNodeParameters]:
     from robot_formation.components.node_parameters import OverheadTrackerNodeParameters
+
+    return OverheadTrackerNodeParameters
+
+
+def _overhead_tracker_component() -> ComponentClass[OverheadTrackerNodeParameters]:
     from robot_formation.components.overhead_tracker import OverheadTrackerComponent
 
-    return OverheadTrackerNodeParameters, OverheadTrackerComponent
+    return OverheadTrackerComponent
 
 
-def _drive() -> Classes[DriveParameters]:
-    from robot_formation.components.drive import DriveComponent
+def _drive_parameters() -> type[DriveParameters]:
     from robot_formation.drive.movement_system import DriveParameters
 
-    return DriveParameters, DriveComponent
+    return DriveParameters
 
 
-def _block_detector() -> Classes[BlockDetectorNodeParameters]:
-    from robot_formation.components.block_detector import BlockDetectorComponent
+def _drive_component() -> ComponentClass[DriveParameters]:
+    from robot_formation.components.drive import DriveComponent
+
+    return DriveComponent
+
+
+def _block_detector_parameters() -> type[BlockDetectorNodeParameters]:
     from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 
-    return BlockDetectorNodeParameters, BlockDetectorComponent
+    return BlockDetectorNodeParameters
 
 
-def _predictor() -> Classes[PredictorParameters]:
-    from robot_formation.components.predictor import PredictorComponent
+def _block_detector_component() -> ComponentClass[BlockDetectorNodeParameters]:
+    from robot_formation.components.block_detector import BlockDetectorComponent
+
+    return BlockDetectorComponent
+
+
+def _predictor_parameters() -> type[PredictorParameters]:
     from robot_formation.koopman.predictors import PredictorParameters
 
-    return PredictorParameters, PredictorComponent
+    return PredictorParameters
 
 
-def _fine_tuner() -> Classes[FineTunerNodeParameters]:
-    from robot_formation.components.fine_tuner import FineTunerComponent
+def _predictor_component() -> ComponentClass[PredictorParameters]:
+    from robot_formation.components.predictor import PredictorComponent
+
+    return PredictorComponent
+
+
+def _fine_tuner_parameters() -> type[FineTunerNodeParameters]:
     from robot_formation.components.node_parameters import FineTunerNodeParameters
 
-    return FineTunerNodeParameters, FineTunerComponent
+    return FineTunerNodeParameters
 
 
-def _leader() -> Classes[LeaderParameters]:
-    from robot_formation.components.leader import LeaderComponent
+def _fine_tuner_component() -> ComponentClass[FineTunerNodeParameters]:
+    from robot_formation.components.fine_tuner import FineTunerComponent
+
+    return FineTunerComponent
+
+
+def _leader_parameters() -> type[LeaderParameters]:
     from robot_formation.leader.leader_motion import LeaderParameters
 
-    return LeaderParameters, LeaderComponent
+    return LeaderParameters
+
+
+def _leader_component() -> ComponentClass[LeaderParameters]:
+    from robot_formation.components.leader import LeaderComponent
+
+    return LeaderComponent
 
 
 # In the order of start.
 _ALL: tuple[NodeKind[Any], ...] = (
-    NodeKind("world", Robots.NONE, _world),
-    NodeKind("overhead_tracker", Robots.NONE, _overhead_tracker),
-    NodeKind("drive", Robots.ALL, _drive),
-    NodeKind("block_detector", Robots.FOLLOWERS, _block_detector),
-    NodeKind("predictor", Robots.FOLLOWERS, _predictor),
-    NodeKind("fine_tuner", Robots.FOLLOWERS, _fine_tuner),
-    NodeKind("leader", Robots.LEADER, _leader),
+    NodeKind("world", Robots.NONE, _world_parameters, _world_component),
+    NodeKind("overhead_tracker", Robots.NONE, _overhead_tracker_parameters, _overhead_tracker_component),
+    NodeKind("drive", Robots.ALL, _drive_parameters, _drive_component),
+    NodeKind("block_detector", Robots.FOLLOWERS, _block_detector_parameters, _block_detector_component),
+    NodeKind("predictor", Robots.FOLLOWERS, _predictor_parameters, _predictor_component),
+    NodeKind("fine_tuner", Robots.FOLLOWERS, _fine_tuner_parameters, _fine_tuner_component),
+    NodeKind("leader", Robots.LEADER, _leader_parameters, _leader_component),
 )
 KINDS = {kind.name: kind for kind in _ALL}

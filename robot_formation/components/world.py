@@ -47,7 +47,10 @@ class WorldComponent(Component):
         self._clock = replace(names.CLOCK_TOPIC, listeners=waiting)
         self._joint_states = {name: names.joint_states(name) for name in parameters.robots}
         self._images = {name: names.camera_image(name) for name in self._cameras}
-        self._odom = {name: names.ground_truth_odom(name) for name in parameters.robots}
+        self._truth = {
+            name: (names.ground_truth_odom(name), names.ground_truth_pose(name), names.ground_truth_path(name))
+            for name in parameters.robots
+        }
 
     def _set_up(self, parameters: WorldNodeParameters, start_ns: int) -> None:
         """Make the world, or leave everything as it was if that is refused."""
@@ -134,13 +137,7 @@ class WorldComponent(Component):
         """See `Component`."""
         topics = [self._clock, names.SURFACE, names.left_plate(), *self._overhead.topics()]
         for name in self._parameters.robots:
-            topics += [
-                self._joint_states[name],
-                self._odom[name],
-                names.ground_truth_pose(name),
-                names.ground_truth_path(name),
-                names.robot_description(name),
-            ]
+            topics += [self._joint_states[name], *self._truth[name], names.robot_description(name)]
         for name in self._cameras:
             topics += [self._images[name], names.camera_info(name)]
         return topics
@@ -148,8 +145,9 @@ class WorldComponent(Component):
     def start(self) -> None:
         """See `Component`: publishes what stands still, and every robot's start."""
         now = self.stamp_ns
-        vertices, colours, triangles = surface_mesh(self._surface)
-        self._send(names.SURFACE, conversions.surface_marker(vertices, colours, triangles, names.WORLD_FRAME))
+        if self.wanted(names.SURFACE):
+            vertices, colours, triangles = surface_mesh(self._surface)
+            self._send(names.SURFACE, conversions.surface_marker(vertices, colours, triangles, names.WORLD_FRAME))
         camera = self._parameters.camera
         for name in self._cameras:
             info = conversions.camera_info(
@@ -323,6 +321,9 @@ class WorldComponent(Component):
 
     def _publish_truth(self, event: RobotPose) -> None:
         robot, state = event.robot, event.state
+        if not any(self.wanted(topic) for topic in self._truth[robot]):
+            return
+        odom, pose_topic, path_topic = self._truth[robot]
         to_world = state.pose.matrix()
         odometry = conversions.body_odometry(
             state.pose.position,
@@ -333,14 +334,13 @@ class WorldComponent(Component):
             child=f"{robot}/{names.BASE_FRAME}",
             stamp_ns=event.stamp_ns,
         )
-        self._send(self._odom[robot], odometry)
+        self._send(odom, odometry)
         if event.final:
             pose = conversions.pose_of(odometry)
-            self._send(names.ground_truth_pose(robot), pose)
+            self._send(pose_topic, pose)
             path = self._trails[robot].add(state.pose.position, pose)
             if path is not None:
-                message = conversions.path(path, names.WORLD_FRAME, event.stamp_ns)
-                self._send(names.ground_truth_path(robot), message)
+                self._send(path_topic, conversions.path(path, names.WORLD_FRAME, event.stamp_ns))
 
 
 def surface_mesh(surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:

@@ -5,9 +5,9 @@ Readers check what comes from outside and raise `MessageError` before anything r
 
 from __future__ import annotations
 
-from robot_formation.network.shared_memory_space import require_space
+from robot_formation.network.loading_ros import require_ros
 
-require_space()  # before the imports below load ROS
+require_ros()  # before the imports below load it
 
 from robot_formation.conversions.basics import (  # noqa: E402
     clock,

@@ -25,8 +25,11 @@ def surface_marker(
     marker = Marker(header=header(0, frame), ns="surface", id=0, type=Marker.TRIANGLE_LIST, action=Marker.ADD)
     marker.pose.orientation.w = 1.0
     marker.scale.x = marker.scale.y = marker.scale.z = 1.0
-    corners = triangles.ravel()
-    marker.points = [Point(x=x, y=y, z=z) for x, y, z in vertices[corners].tolist()]
-    marker.colors = [ColorRGBA(r=r, g=g, b=b, a=1.0) for r, g, b in colours[corners].tolist()]
+    # Triangles share their corners: each is made once, not six times.
+    points = [Point(x=x, y=y, z=z) for x, y, z in vertices.tolist()]
+    shades = [ColorRGBA(r=r, g=g, b=b, a=1.0) for r, g, b in colours.tolist()]
+    corners = triangles.ravel().tolist()
+    marker.points = [points[corner] for corner in corners]
+    marker.colors = [shades[corner] for corner in corners]
     marker.color.a = 1.0
     return marker

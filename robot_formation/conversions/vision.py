@@ -23,8 +23,10 @@ def image(pixels: NDArray[np.uint8], frame: str, stamp_ns: int) -> Image:
     encoding, channels = ("mono8", 1) if pixels.ndim == 2 else ("rgb8", 3)
     message = Image(header=header(stamp_ns, frame), height=height, width=width, encoding=encoding)
     message.step = channels * width
-    # Assigning an array('B') is checked in 0.1 ms, a list in 4 ms.
-    message.data = array.array("B", pixels.tobytes())
+    # Assigning an array('B') is checked at once, a list byte by byte.
+    data = array.array("B")
+    data.frombytes(np.ascontiguousarray(pixels).data.cast("B"))
+    message.data = data
     return message
 
 

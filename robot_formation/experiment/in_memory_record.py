@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from robot_formation import conversions, exit_codes, names
 from robot_formation.analysis.from_bag import record_of, run_topics
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.bag.run_details import slots_text
 from robot_formation.experiment.in_process import InProcessRun
+from robot_formation.experiment.run_result import RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import Message
 from robot_formation.parameters import to_mapping
@@ -18,19 +19,54 @@ from robot_formation.parameters import to_mapping
 OUTCOMES = {exit_codes.DONE: "done", exit_codes.LOST: "lost"}
 
 
-def run_in_memory(
-    scenario: Scenario, make_run: Callable[[Scenario, Callable[[str, Message], None]], InProcessRun] | None = None
-) -> RunRecord:
+MakeRun = Callable[[Scenario, Callable[[str, Message], None]], InProcessRun]
+
+
+def run_in_memory(scenario: Scenario, make_run: MakeRun | None = None, *, ground: bool = True) -> RunRecord:
     """Run a scenario in this process and return its record, as a bag of it would give it.
 
     Args:
         scenario: what to run.
         make_run: builds the run from the scenario and its listener; by default a plain `InProcessRun`.
+        ground: whether the surface's mesh is wanted, which figures show and no quantity needs.
 
     Raises:
         FormationError: if a component refuses its parameters, or the run stands still.
     """
-    wanted = run_topics(scenario.robots)
+    # What the analysis reads of a run's parameters: spacing, distances, the marker's height.
+    parameters = {"fine_tuner": to_mapping(scenario.fine_tuner), "world": to_mapping(scenario.world)}
+    details = {
+        "scenario": scenario.setup.name,
+        "timesteps": str(scenario.leader.timesteps),
+        "slots": slots_text(scenario.slots),
+        "parameters": json.dumps(parameters),
+    }
+    return run_with_details(scenario, details, make_run, ground=ground)[0]
+
+
+def run_with_details(
+    scenario: Scenario,
+    details: Mapping[str, str],
+    make_run: MakeRun | None = None,
+    beside: Callable[[str, Message], None] | None = None,
+    *,
+    ground: bool = True,
+) -> tuple[RunRecord, RunResult]:
+    """Run a scenario in this process; return its record, and how it ended.
+
+    Args:
+        scenario: what to run.
+        details: what the run says of itself, as a bag's metadata has it.
+        make_run: builds the run from the scenario and its listener; by default a plain `InProcessRun`.
+        beside: is called with every topic and message too.
+        ground: see `run_in_memory`.
+
+    Raises:
+        FormationError: if a component refuses its parameters, or the run stands still.
+    """
+    wanted = set(run_topics(scenario.robots))
+    if not ground:
+        wanted.remove(names.SURFACE.of())
     messages: dict[str, list[Message]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
     now_ns = 0
@@ -43,15 +79,13 @@ def run_in_memory(
         elif topic in wanted:
             messages[topic].append(message)
             stamps[topic].append(now_ns)
+        if beside is not None:
+            beside(topic, message)
 
     run = make_run(scenario, listen) if make_run is not None else InProcessRun(scenario, listen=listen)
-    code, _ = run.run()
-    details = {
-        "scenario": scenario.setup.name,
-        "timesteps": str(scenario.leader.timesteps),
-        "slots": slots_text(scenario.slots),
-        # What the analysis reads of them: spacing, distances, the marker's height.
-        "parameters": json.dumps({"fine_tuner": to_mapping(scenario.fine_tuner), "world": to_mapping(scenario.world)}),
-        "outcome": OUTCOMES.get(code, "incomplete"),
-    }
-    return record_of(scenario.robots, messages, details, stamps)
+    if beside is None:
+        run.heard = wanted | {clock}
+    code, reason = run.run()
+    outcome = {"outcome": OUTCOMES.get(code, "incomplete")}
+    record = record_of(scenario.robots, messages, {**details, **outcome}, stamps)
+    return record, RunResult(code, None, reason, run.warnings)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import TypeVar
 from robot_formation import conversions, exit_codes
 from robot_formation.bag.bag_path import PathReservation, check_free
 from robot_formation.bag.message_recorder import Recorder
+from robot_formation.bag.writer import DEFAULT_OPTIONS, WriteOptions
 from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import NodeKind
 from robot_formation.components.world import WorldComponent
@@ -46,12 +47,15 @@ class InProcessRun:
         recorder: where the messages go, if anywhere.
         images: whether pictures are recorded too.
         listen: called with every absolute topic name and message, before the components get it.
+        heard: the absolute names of all topics that `listen` does something with; None: any. Of others, those that no
+            component hears and that are costly to make are left out.
     """
 
     scenario: Scenario
     recorder: Recorder | None = None
     images: bool = False
     listen: Callable[[str, Message], None] | None = None
+    heard: Collection[str] | None = None
     warnings: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -104,7 +108,14 @@ class InProcessRun:
         component = kind.component_class()(self.scenario.of_robot(kind, robot), Place(robot))
         namespace = f"/{robot}" if robot else ""
         component.attach(partial(self._send, namespace), partial(self._say, f"{namespace}/{kind.name}"))
+        component.wanted = partial(self._wanted, namespace)
         return _Hosted(component, namespace)
+
+    def _wanted(self, namespace: str, topic: Topic) -> bool:
+        """Whether anybody does something with what is sent on a topic."""
+        name = absolute(namespace, topic.name)
+        listened = self.listen is not None and (self.heard is None or name in self.heard)
+        return self.recorder is not None or listened or name in self._handlers
 
     def _send(self, namespace: str, topic: Topic, message: Message) -> None:
         self._queue.append((absolute(namespace, topic.name), topic, message))
@@ -125,12 +136,25 @@ class InProcessRun:
                 handler(message)
 
 
+def progress_of(scenario: Scenario, say: Callable[[str], None]) -> Progress:
+    """Make what listens to a run that begins now, and tells `say` a line per timestep."""
+    began = time.monotonic()
+    return Progress(
+        scenario.slots,
+        scenario.leader.timesteps,
+        say,
+        lambda: time.monotonic() - began,
+        delayed=scenario.setup.spacing is Spacing.DELAYED,
+    )
+
+
 def run_in_process(
     scenario: Scenario,
     bag: Path | None,
     metadata: dict[str, str],
     *,
     images: bool = False,
+    options: WriteOptions = DEFAULT_OPTIONS,
     say: Callable[[str], None] = lambda text: None,
     reservation: PathReservation | None = None,
 ) -> RunResult:
@@ -143,19 +167,13 @@ def run_in_process(
         FormationError: if a component refuses its parameters, or the bag's path is taken or can't be written.
     """
     began = time.monotonic()
-    progress = Progress(
-        scenario.slots,
-        scenario.leader.timesteps,
-        say,
-        lambda: time.monotonic() - began,
-        delayed=scenario.setup.spacing is Spacing.DELAYED,
-    )
+    progress = progress_of(scenario, say)
     run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
     with contextlib.ExitStack() as stack:
         if bag is not None:
             stack.enter_context(reservation or PathReservation(bag))
             check_free(bag)
-            run.recorder = Recorder(bag, metadata)
+            run.recorder = Recorder(bag, metadata, options)
             stack.callback(run.recorder.close)
         try:
             code, reason = run.run()

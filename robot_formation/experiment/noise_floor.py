@@ -26,7 +26,6 @@ from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose, pose_on_surface
 
-IDEAL = ("ideal", "ideal+close")
 _ITERATIONS = 8
 _BESIDE = slot(FORMATION_DISTANCE_M)
 
@@ -66,6 +65,9 @@ class IdealRun(InProcessRun):
         elif topic == names.RESIDUAL and conversions.has_estimate(message):
             self._learn(namespace, conversions.read_displacement(message))
         super()._send(namespace, topic, message)
+
+    def _wanted(self, namespace: str, topic: names.Topic) -> bool:
+        return names.absolute(namespace, topic.name) in self._odometry or super()._wanted(namespace, topic)
 
     def _learn(self, namespace: str, residual: Motion) -> None:
         """Compare the camera's residual with the truth: the difference is mostly the same in each timestep."""

@@ -15,27 +15,56 @@ from robot_formation.geometry.slots import Slots
 from robot_formation.names import Message
 
 _SAME = 1e-6  # metres and radians
+_FORGOTTEN_AT_ONCE = 1000
+
+
+@dataclass
+class _Entries:
+    """Stamps [ns] with motions, in order; the oldest can be forgotten, and the others keep their numbers."""
+
+    kept: list[tuple[int, Motion]] = field(default_factory=list)
+    forgotten: int = 0
+
+    def __len__(self) -> int:
+        return self.forgotten + len(self.kept)
+
+    def __getitem__(self, number: int) -> tuple[int, Motion]:
+        return self.kept[number - self.forgotten]
+
+    def add(self, stamp_ns: int, motion: Motion) -> None:
+        """Append the next one."""
+        self.kept.append((stamp_ns, motion))
+
+    def between(self, after_ns: int, until_ns: int) -> list[tuple[int, Motion]]:
+        """List those in (after, until]."""
+        return self.kept[bisect_right(self.kept, after_ns, key=_stamp) : bisect_right(self.kept, until_ns, key=_stamp)]
+
+    def last(self, until_ns: int) -> tuple[int, Motion] | None:
+        """Return the last one until a stamp."""
+        number = bisect_right(self.kept, until_ns, key=_stamp)
+        return self.kept[number - 1] if number else None
+
+    def forget(self, until_ns: int) -> None:
+        """Forget those before the last one until a stamp, many at a time."""
+        old = bisect_right(self.kept, until_ns, key=_stamp) - 1
+        if old > _FORGOTTEN_AT_ONCE:
+            del self.kept[:old]
+            self.forgotten += old
 
 
 @dataclass
 class _Heard:
-    """What was heard of a robot: stamps [ns] with poses, finished moves and timesteps; and what was said.
+    """What was heard of a robot: poses, finished moves and timesteps; and what was said.
 
-    A topic keeps its order, so these lists are sorted by stamp; between topics there is no order.
+    A topic keeps its order, so these are sorted by stamp; between topics there is no order.
     """
 
-    poses: list[tuple[int, Motion]] = field(default_factory=list)
-    moves: list[tuple[int, Motion]] = field(default_factory=list)
-    timesteps: list[tuple[int, Motion]] = field(default_factory=list)
+    poses: _Entries = field(default_factory=_Entries)
+    moves: _Entries = field(default_factory=_Entries)
+    timesteps: _Entries = field(default_factory=_Entries)
     told: int = 0
     begun: int = 0
     state: str = ""
-
-    def moves_between(self, after_ns: int, until_ns: int) -> list[tuple[int, Motion]]:
-        """List the moves that ended in (after, until]."""
-        return self.moves[
-            bisect_right(self.moves, after_ns, key=_stamp) : bisect_right(self.moves, until_ns, key=_stamp)
-        ]
 
     def timestep_moves(self, timestep: int, leader_ns: int) -> list[Motion] | None:
         """List the moves of a finished timestep, counted from 1; None until all are there.
@@ -47,13 +76,13 @@ class _Heard:
             return None
         if timestep > 1:
             return self._moves_after(timestep, self.timesteps[timestep - 2][0])
-        ends = [leader_ns, *(end for end, _ in reversed(self.moves_between(-1, self.timesteps[0][0] - 1))), -1]
+        ends = [leader_ns, *(end for end, _ in reversed(self.moves.between(-1, self.timesteps[0][0] - 1))), -1]
         return next((moves for end in ends if (moves := self._moves_after(1, end)) is not None), None)
 
     def _moves_after(self, timestep: int, after_ns: int) -> list[Motion] | None:
         until_ns, displacement = self.timesteps[timestep - 1]
         # The fine-tuner counts no move whose displacement the drive couldn't measure.
-        moves = [move for _, move in self.moves_between(after_ns, until_ns) if move.finite]
+        moves = [move for _, move in self.moves.between(after_ns, until_ns) if move.finite]
         total = Motion()
         for move in moves:
             total = total.then(move)
@@ -65,11 +94,15 @@ class _Heard:
 
         A robot has a true pose at the very end of each move, so an earlier one is another place's.
         """
-        move = bisect_right(self.moves, until_ns, key=_stamp)
-        pose = bisect_right(self.poses, until_ns, key=_stamp)
-        if pose == 0 or (move > 0 and self.poses[pose - 1][0] < self.moves[move - 1][0]):
+        move, pose = self.moves.last(until_ns), self.poses.last(until_ns)
+        if pose is None or (move is not None and pose[0] < move[0]):
             return None
-        return self.poses[pose - 1][1]
+        return pose[1]
+
+    def forget(self, until_ns: int) -> None:
+        """Forget what was over before a stamp: a long run has very many moves."""
+        for entries in (self.poses, self.moves, self.timesteps):
+            entries.forget(until_ns)
 
 
 def _stamp(entry: tuple[int, Motion]) -> int:
@@ -110,6 +143,7 @@ class Progress:
         self._elapsed = elapsed
         self._places = {names.follower(n): place for n, place in enumerate(slots, 1)}
         self._followers = list(self._places)
+        self._begun_ns: int | None = None  # when the leader's first move ended
         self._heard = {robot: _Heard() for robot in (names.LEADER, *self._followers)}
         self._handlers: dict[str, Callable[[Message], None]] = {}
         for robot in self._heard:
@@ -144,13 +178,15 @@ class Progress:
             self._say(f"{robot} is in timestep {heard.begun}/{self._timesteps}{doing}  {self._elapsed():6.1f} s")
 
     def _pose(self, robot: str, message: Message) -> None:
-        self._heard[robot].poses.append((conversions.stamp_of(message), conversions.read_pose(message.pose)))
+        self._heard[robot].poses.add(conversions.stamp_of(message), conversions.read_pose(message.pose))
 
     def _moved(self, robot: str, message: Message) -> None:
-        self._heard[robot].moves.append((conversions.stamp_of(message), conversions.read_displacement(message)))
+        self._heard[robot].moves.add(conversions.stamp_of(message), conversions.read_displacement(message))
+        if robot == names.LEADER and self._begun_ns is None:
+            self._begun_ns = conversions.stamp_of(message)
 
     def _displacement(self, robot: str, message: Message) -> None:
-        self._heard[robot].timesteps.append((conversions.stamp_of(message), conversions.read_displacement(message)))
+        self._heard[robot].timesteps.add(conversions.stamp_of(message), conversions.read_displacement(message))
 
     def _alignment(self, robot: str, message: Message) -> None:
         state = AlignmentState.parse(message.data)
@@ -175,15 +211,14 @@ class Progress:
         """Print the robot's next timestep if everything of it has arrived."""
         heard, leader = self._heard[robot], self._heard[names.LEADER]
         timestep = heard.told + 1
-        if len(leader.moves) < timestep:
+        if len(leader.moves) < timestep or self._begun_ns is None:
             return False
-        begun_ns = leader.moves[0][0]
-        moves = heard.timestep_moves(timestep, begun_ns)
+        moves = heard.timestep_moves(timestep, self._begun_ns)
         if moves is None:
             return False
         neighbour_name = names.beacon_neighbour(robot)
         neighbour = self._heard[neighbour_name]
-        if neighbour_name != names.LEADER and neighbour.timestep_moves(timestep, begun_ns) is None:
+        if neighbour_name != names.LEADER and neighbour.timestep_moves(timestep, self._begun_ns) is None:
             return False
         ended_ns = heard.timesteps[timestep - 1][0]
         own_pose = heard.resting_pose(ended_ns)
@@ -191,8 +226,21 @@ class Progress:
         if own_pose is None or place is None:
             return False
         heard.told = timestep
+        self._forget()
         self._say_line(robot, timestep, moves[1:], own_pose, place)  # without the prediction move
         return True
+
+    def _forget(self) -> None:
+        """Forget what no line needs any more: a line to come is of a later timestep than those told of all followers.
+
+        The moves of such a timestep begin where the one before it ended, and places may be those of one before that.
+        """
+        told = min(self._heard[robot].told for robot in self._followers)
+        if told < 2:
+            return
+        until_ns = min(self._ended_ns(robot, told - 1) for robot in self._heard)
+        for heard in self._heard.values():
+            heard.forget(until_ns)
 
     def _ended_ns(self, robot: str, timestep: int) -> int:
         """Return when a robot finished a timestep, whose messages are here; 0 for the start."""

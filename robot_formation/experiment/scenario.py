@@ -18,7 +18,7 @@ from robot_formation.components.node_parameters import (
 )
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
-from robot_formation.experiment.chain_defaults import backdrop, unchecked_headings
+from robot_formation.experiment.chain_defaults import backdrop, edges_before_board, unchecked_headings
 from robot_formation.experiment.disturbances import pushes_of
 from robot_formation.experiment.formations import slots_of, starts_of
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
@@ -256,6 +256,7 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
             formation_distance_m=slots[0].u_m,
             formation_ahead_m=slots[0].v_m,
             **timed,
+            **edges_before_board(world.marker, settings.get("fine_tuner", {})),
             **unchecked_headings(setup.schedule, settings.get("fine_tuner", {})),
             **first["fine_tuner"],
             **bounds,
@@ -320,20 +321,42 @@ def load(path: Path) -> Scenario:
         raise ScenarioError(
             f"{path}: a scenario is a mapping with entries like 'seed' and 'leader'; see config/scenarios"
         )
+    return from_content({"name": path.stem, **content}, where=str(path))
+
+
+def from_content(content: Mapping[str, object], *, where: str) -> Scenario:
+    """Make a scenario of what a scenario file holds; `where` that is from is for messages.
+
+    Raises:
+        ScenarioError: if a node's entry isn't a mapping.
+        ParameterError: on unknown or wrong entries.
+    """
     known = [*specs(Setup), *KINDS]
     for key in content:
         if key not in known:
-            raise ParameterError(f"{path}: no entry '{key}'{suggestion(str(key), known)}")
-    top = {key: value for key, value in content.items() if key not in KINDS}
-    setup = from_mapping(Setup, {"name": path.stem, **top}, where=str(path))
+            raise ParameterError(f"{where}: no entry '{key}'{suggestion(str(key), known)}")
+    setup = from_mapping(Setup, {key: value for key, value in content.items() if key not in KINDS}, where=where)
     sections: dict[str, dict[str, object]] = {}
     for kind in KINDS:
         section = content.get(kind, {})
         section = {} if section is None else section  # an entry with nothing below it
         if not isinstance(section, Mapping):
-            raise ScenarioError(f"{path}: '{kind}' must hold parameters of that node, not {shown(section)}")
-        sections[kind] = _checked(kind, flatten(section, where=f"{path}: {kind}"), where=f"{path}: {kind}")
+            raise ScenarioError(f"{where}: '{kind}' must hold parameters of that node, not {shown(section)}")
+        sections[kind] = _checked(kind, flatten(section, where=f"{where}: {kind}"), where=f"{where}: {kind}")
     return build(setup, sections, [entry for entry in START if entry in content])
+
+
+def to_content(scenario: Scenario) -> dict[str, object]:
+    """Return what a scenario file would hold: what differs from the defaults, which `from_content` reads back."""
+    defaults = to_mapping(Setup())
+    said = to_mapping(scenario.setup)
+    content: dict[str, object] = {
+        name: value
+        for name, value in said.items()
+        if name == "name" or name in scenario.given or (name not in START and value != defaults[name])
+    }
+    content.update({kind: dict(section) for kind, section in scenario.settings.items() if section})
+    return content
 
 
 def _checked(kind: str, section: Mapping[str, object], *, where: str) -> dict[str, object]:

@@ -5,69 +5,42 @@ The table is a CSV file that grows row by row, so that a sweep which was stopped
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor
+import itertools
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from functools import partial
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from robot_formation import plugins
 from robot_formation.analysis.conditions import conditions
 from robot_formation.analysis.quantities import analyse
-from robot_formation.batch.pool import run_parallel
+from robot_formation.analysis.run_record import RunRecord
 from robot_formation.batch.resumable_table import ResumableTable, read_record, write_record
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
-from robot_formation.experiment.in_memory_record import run_in_memory
-from robot_formation.experiment.in_process import InProcessRun
-from robot_formation.experiment.noise_floor import IDEAL, IdealRun
 from robot_formation.experiment.path_plan import STRAIGHT
 from robot_formation.json_values import JsonObject
 from robot_formation.koopman.predictors import NAMES, Predictor, PredictorParameters, check_predictor_name
 from robot_formation.leader.paths import Teleop, check_path_name
-from robot_formation.names import Message
 from robot_formation.parameters import ParameterError, suggestion
 from robot_formation.plugins import PluginError
 from robot_formation.surface import check_surface_name
 
+if TYPE_CHECKING:
+    from robot_formation.experiment.in_process import InProcessRun
+    from robot_formation.names import Message
+
 # The comparison's common ground unless --set says otherwise: the paper's fine-tuner, pictures only when waited for.
 CONDITIONS = ("fine_tuner.mode=paper", "world.camera.mode=on_demand", "world.overhead.enabled=false")
+# The noise floor's moves instead of a predictor's, and which predictor runs with them (see noise_floor.py).
+IDEAL = {"ideal": "previous", "ideal+close": "formation"}
 RUNS_NAME = "runs.csv"
 PLAN_NAME = "sweep.json"
-_GOES_ON = "the same command with the same --out goes on"
 
 
 class SweepError(FormationError):
     """A sweep can't be planned, or its folder can't be used."""
-
-
-class Failure(NamedTuple):
-    """A run that a class from outside the package has ended: which class, and the run with what was wrong."""
-
-    subject: str
-    text: str
-
-
-class FailedRunsError(SweepError):
-    """Runs that classes from outside the package have ended; all others of the sweep were done.
-
-    Attributes:
-        lines: one for each such class: its first failed run, and how many others failed.
-    """
-
-    def __init__(self, failures: Sequence[Failure]) -> None:
-        """Take at least one failure."""
-        texts: dict[str, list[str]] = {}
-        for failure in failures:
-            texts.setdefault(failure.subject, []).append(failure.text)
-        self.lines = [_with_others(found[0], len(found) - 1) for found in texts.values()]
-        super().__init__("; ".join(self.lines))
-
-
-def _with_others(text: str, others: int) -> str:
-    return f"{text} ({others} more of its runs failed)" if others else text
 
 
 class Task(NamedTuple):
@@ -113,7 +86,12 @@ class Row:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a sweep consists of: every combination, with settings KEY=VALUE for all of them."""
+    """What a sweep consists of: every combination, with settings KEY=VALUE for all of them.
+
+    Attributes:
+        base: a scenario as JSON, of which all runs are made just as it is; its name then is the only track. Empty: the
+            runs are made of preset tracks, under `CONDITIONS`.
+    """
 
     tracks: tuple[str, ...]
     surfaces: tuple[str, ...]
@@ -121,11 +99,16 @@ class Plan:
     seeds: tuple[int, ...]
     settings: tuple[str, ...] = ()
     paths: tuple[str, ...] = (STRAIGHT,)
+    base: str = ""
+
+    def build(self, task: Task) -> scenarios.Scenario:
+        """Build the scenario of one run. Errors as for `build`."""
+        return build(task, self.settings, self.base)
 
     def turns_unfollowed(self, path: str) -> bool:
         """Whether a path turns, but the followers align by a mode that knows no heading."""
         task = Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0], path)
-        return build(task, self.settings).turns_unfollowed
+        return self.build(task).turns_unfollowed
 
     def check(self) -> None:
         """Check every name and setting before anything is run.
@@ -134,7 +117,7 @@ class Plan:
             FormationError: naming what is misspelt or out of range.
         """
         for kind, chosen, check in (
-            ("track", self.tracks, _check_track),
+            ("track", self.tracks, _accept if self.base else _check_track),
             ("surface", self.surfaces, check_surface_name),
             ("predictor", self.predictors, _check_predictor),
             ("path", self.paths, _check_path),
@@ -156,7 +139,7 @@ class Plan:
         for track in self.tracks:
             for surface in self.surfaces:
                 for path in self.paths:
-                    scenario = build(Task(track, surface, self.predictors[0], self.seeds[0], path), self.settings)
+                    scenario = self.build(Task(track, surface, self.predictors[0], self.seeds[0], path))
                     scenario.check()
                     plate = (track, path, scenario.plate_m)
                     if plate not in plates:
@@ -176,7 +159,8 @@ class Plan:
 
     def conditions(self) -> JsonObject:
         """List the conditions of all runs by name, as those of a single run."""
-        scenario = build(Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0]), self.settings)
+        path = self.paths[0] if self.base else STRAIGHT
+        scenario = self.build(Task(self.tracks[0], self.surfaces[0], self.predictors[0], self.seeds[0], path))
         found = conditions(scenario.by_node(), [place.uv_m for place in scenario.slots])
         return {**found, "in_process": True}
 
@@ -188,6 +172,10 @@ class Plan:
                     for surface in self.surfaces:
                         for predictor in self.predictors:
                             yield Task(track, surface, predictor, seed, path)
+
+
+def _accept(name: str) -> None:
+    pass
 
 
 def _check_track(name: str) -> None:
@@ -207,41 +195,63 @@ def _check_path(name: str) -> None:
     check_path_name(name)
 
 
-def build(task: Task, settings: Sequence[str]) -> scenarios.Scenario:
+def build(task: Task, settings: Sequence[str], base: str = "") -> scenarios.Scenario:
     """Build a run's scenario.
+
+    Args:
+        task: the run.
+        settings: KEY=VALUE each.
+        base: see `Plan`.
 
     Raises:
         FormationError: naming what is misspelt or out of range.
     """
-    scenario = scenarios.with_surface(scenarios.load_track(task.track), task.surface)
+    predictor = IDEAL.get(task.predictor, task.predictor)
+    if base:
+        scenario = scenarios.from_content(json.loads(base), where="the sweep's scenario")
+        if task.surface != scenario.world.surface:
+            scenario = scenarios.with_surface(scenario, task.surface)
+        chosen = [("leader.path", task.path)] if task.path != scenario.leader.path else []
+        return scenarios.with_values(
+            scenario, [*chosen, ("predictor.name", predictor), ("seed", task.seed)], source="sweep"
+        )
+    scenario = _track_on(task.track, task.surface)
     path = [] if task.path == STRAIGHT else [f"leader.path={task.path}"]
-    predictor = {"ideal": "previous", "ideal+close": "formation"}.get(task.predictor, task.predictor)
     return scenarios.override(
         scenario, [*CONDITIONS, *settings, *path, f"predictor.name={predictor}", f"seed={task.seed}"]
     )
 
 
-def run_task(task: Task, settings: Sequence[str]) -> Row:
-    """Carry out one run.
+@lru_cache(maxsize=16)
+def _track_on(track: str, surface: str) -> scenarios.Scenario:
+    """Return a preset track on a surface; the same for many runs."""
+    return scenarios.with_surface(scenarios.load_track(track), surface)
+
+
+def run_task(task: Task, settings: Sequence[str], base: str = "") -> Row:
+    """Carry out one run; for the arguments see `build`.
 
     Raises:
         PluginError: if a class from outside the package fails; the text names the run.
         SweepError: if the scenario can't be run to an end for another reason; so does it.
     """
-
-    def make_run(scenario: scenarios.Scenario, listen: Callable[[str, Message], None]) -> InProcessRun:
-        if task.predictor in IDEAL:
-            return IdealRun(scenario, listen, close=task.predictor == "ideal+close")
-        return InProcessRun(scenario, listen=listen)
-
     try:
-        analysis = analyse(run_in_memory(build(task, settings), make_run))
+        return run_to_row(task, settings, base)
     except FormationError as error:
         path = "" if task.path == STRAIGHT else f", path {task.path}"
         run = f"track {task.track}{path}, surface {task.surface}, predictor {task.predictor}, seed {task.seed}"
         if isinstance(error, PluginError):
             raise PluginError(f"{error} ({run})") from None
         raise SweepError(f"{run}: {error}") from None
+
+
+def run_to_row(task: Task, settings: Sequence[str], base: str = "") -> Row:
+    """Carry out one run; errors don't name it. For the arguments see `build`.
+
+    Raises:
+        FormationError: if the scenario can't be run to an end, or a class from outside the package fails.
+    """
+    analysis = analyse(_carry_out(task, build(task, settings, base)))
     totals = analysis.followers[0].totals
     # A sum of nothing is an integer 0, which the table would give back as another text.
     quantities: JsonObject = {
@@ -255,24 +265,18 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
     )
 
 
-def _attempt(run: Callable[[Task, Sequence[str]], Row], task: Task, settings: Sequence[str]) -> Row | Failure:
-    """Carry out one run; a class from outside that fails doesn't stop the others."""
-    try:
-        return run(task, settings)
-    except PluginError as error:
-        return Failure(plugins.subject(error), str(error))
+def _carry_out(task: Task, scenario: scenarios.Scenario) -> RunRecord:
+    # Here, so that who only reads sweeps needs neither ROS nor PyBullet.
+    from robot_formation.experiment.in_memory_record import run_in_memory
+    from robot_formation.experiment.in_process import InProcessRun
+    from robot_formation.experiment.noise_floor import IdealRun
 
+    def make_run(scenario: scenarios.Scenario, listen: Callable[[str, Message], None]) -> InProcessRun:
+        if task.predictor in IDEAL:
+            return IdealRun(scenario, listen, close=task.predictor == "ideal+close")
+        return InProcessRun(scenario, listen=listen)
 
-def _rows(results: Iterable[Row | Failure]) -> Iterator[Row]:
-    """Yield the rows, and raise FailedRunsError at the end if some runs gave none."""
-    failures = []
-    for result in results:
-        if isinstance(result, Failure):
-            failures.append(result)
-        else:
-            yield result
-    if failures:
-        raise FailedRunsError(failures)
+    return run_in_memory(scenario, make_run, ground=False)
 
 
 class Table:
@@ -285,13 +289,17 @@ class Table:
             SweepError: if the folder holds something else, or a sweep with other settings.
         """
         record = folder / PLAN_NAME
-        if record.exists():
-            self._require_same(record, plan)
-        elif folder.exists() and any(folder.iterdir()):
-            raise SweepError(f"{folder} is not empty and holds no sweep; choose another --out")
-        folder.mkdir(parents=True, exist_ok=True)
-        write_record(record, asdict(plan))
-        self._table = _runs_table(folder, "choose another --out")
+        try:
+            if record.exists():
+                plan = self._same(record, plan)
+            elif folder.exists() and any(folder.iterdir()):
+                raise SweepError(f"{folder} is not empty and holds no sweep; choose another folder")
+            folder.mkdir(parents=True, exist_ok=True)
+            write_record(record, asdict(plan))
+        except OSError as error:
+            problem = error.strerror or error
+            raise SweepError(f"{folder} can't be used: {problem}; choose another folder") from error
+        self._table = _runs_table(folder, "choose another folder")
         self.rows: dict[Task, Row] = {}
         if self._table.path.exists():
             self.rows = {row.task: row for row in self._table.read()}
@@ -303,14 +311,37 @@ class Table:
         self._table.append([row])
 
     @staticmethod
-    def _require_same(record: Path, plan: Plan) -> None:
+    def _same(record: Path, plan: Plan) -> Plan:
+        """Return the plan with the recorded base, which all rows so far were made of."""
         try:
-            settings = [str(setting) for setting in read_record(record)["settings"]]
+            known = read_record(record)
+            settings = [str(setting) for setting in known["settings"]]
+            base = str(known.get("base", ""))
         except (ValueError, KeyError, TypeError):
-            raise SweepError(f"{record}: no record of a sweep; choose another --out") from None
+            raise SweepError(f"{record}: no record of a sweep; choose another folder") from None
+        if not _same_runs(plan, base):
+            raise SweepError(f"{record.parent} holds a sweep of another scenario; choose another folder")
         if settings != list(plan.settings):
             differing = _difference(settings, plan.settings)
-            raise SweepError(f"{record.parent} holds a sweep with other settings: {differing}; choose another --out")
+            raise SweepError(f"{record.parent} holds a sweep with other settings: {differing}; choose another folder")
+        return replace(plan, base=base)
+
+
+def _same_runs(plan: Plan, base: str) -> bool:
+    """Whether a plan's runs would be the same with another base: values may be given there, or be the defaults."""
+    if not base or not plan.base:
+        return base == plan.base
+    other = replace(plan, base=base)
+    for surface, path in itertools.product(plan.surfaces, plan.paths):
+        task = Task(plan.tracks[0], surface, plan.predictors[0], plan.seeds[0], path)
+        now = plan.build(task)
+        try:
+            then = other.build(task)
+        except (FormationError, ValueError, TypeError, AttributeError, RecursionError):  # a damaged record
+            return False
+        if (now.setup, now.by_node()) != (then.setup, then.by_node()):
+            return False
+    return True
 
 
 def _difference(earlier: Sequence[str], now: Sequence[str]) -> str:
@@ -340,8 +371,11 @@ def read_sweep(folder: Path) -> tuple[Plan, list[Row]]:
         names = ("tracks", "surfaces", "predictors", "settings")
         tracks, surfaces, predictors, settings = (tuple(map(str, record[name])) for name in names)
         paths = tuple(map(str, record.get("paths", (STRAIGHT,))))
-        plan = Plan(tracks, surfaces, predictors, tuple(map(int, record["seeds"])), settings, paths)
-    except (ValueError, KeyError, TypeError):
+        seeds, base = tuple(map(int, record["seeds"])), str(record.get("base", ""))
+        if base and not isinstance(json.loads(base), dict):
+            raise TypeError
+        plan = Plan(tracks, surfaces, predictors, seeds, settings, paths, base)
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise SweepError(f"{path}: no record of a sweep; {remedy}") from None
     rows = chosen(plan, {row.task: row for row in _runs_table(folder, remedy).read()})
     if not rows:
@@ -362,56 +396,3 @@ def remaining(plan: Plan, rows: Mapping[Task, Row]) -> list[Task]:
 def chosen(plan: Plan, rows: Mapping[Task, Row]) -> list[Row]:
     """List the rows of a plan, in its order."""
     return [rows[task] for task in plan.tasks() if task in rows]
-
-
-def carry_out(tasks: Iterable[Task], settings: Sequence[str], jobs: int) -> Iterator[Row]:
-    """Run tasks on this machine's cores by joblib; yield rows in the order of the tasks, each as soon as it is there.
-
-    Raises:
-        FailedRunsError: when all others are done, if a class from outside the package failed in some.
-        SweepError: if a run can't come to its end for another reason, or a worker process dies.
-    """
-    try:
-        yield from _rows(run_parallel(_attempt, ((run_task, task, settings) for task in tasks), jobs))
-    except BrokenExecutor:
-        raise SweepError(f"a worker process died (too little memory for --jobs {jobs}?); {_GOES_ON}") from None
-
-
-def carry_out_by_dask(tasks: Iterable[Task], settings: Sequence[str], scheduler: str) -> Iterator[Row]:
-    """Run tasks on a Dask cluster; yield rows as they come.
-
-    Raises:
-        FailedRunsError: when all others are done, if a class from outside the package failed in some.
-        SweepError: if Dask isn't installed, the scheduler doesn't answer or goes away, or a run can't be done there.
-    """
-    try:
-        from dask.distributed import Client, as_completed
-    except ImportError:
-        raise SweepError("--dask needs the package 'distributed'; pip install 'dask[distributed]'") from None
-    # What happens to the connection is told in a line here, not by a traceback in its log.
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
-    try:
-        client = Client(scheduler, timeout="10s")
-    except (OSError, ValueError) as error:
-        reason = str(error).partition("\n")[0] or type(error).__name__
-        raise SweepError(f"no Dask scheduler answers at {scheduler}: {reason}") from None
-    with client:
-        futures = client.map(partial(_attempt, run_task, settings=settings), list(tasks), pure=False)
-        yield from _rows(_result(future, scheduler) for future in as_completed(futures))
-
-
-def _result(future: Any, scheduler: str) -> Row | Failure:
-    """Return what a Dask worker has found.
-
-    Raises:
-        SweepError: if it has found nothing.
-    """
-    if future.cancelled():
-        raise SweepError(f"the Dask cluster at {scheduler} is gone; {_GOES_ON}")
-    problem = future.exception()
-    if isinstance(problem, FormationError):
-        raise problem
-    if problem is not None:
-        raise SweepError(f"a Dask worker can't do the runs: {type(problem).__name__}: {problem}; {_GOES_ON}")
-    result: Row | Failure = future.result()
-    return result

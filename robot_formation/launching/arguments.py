@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from robot_formation.errors import FormationError
+from robot_formation.errors import FormationError, shown
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.experiment.stand_ins import LEADER_NODE, LONGEST_S, stand_ins_of
 from robot_formation.network.loopback import PROFILES, RANGE, use_loopback
 from robot_formation.paths import config_dir
 from robot_formation.schedule.schedules import Schedule
@@ -45,6 +46,12 @@ ARGUMENTS = {
     "real_time_factor": Argument("", "0: as fast as possible, 1: real time; empty: the scenario's"),
     "set": Argument("", "further settings, separated by spaces, like 'predictor.forgetting=0.95 followers=2'"),
     "namespace": Argument("", "namespace of the formation, below the one that was pushed; empty: none of its own"),
+    "without": Argument(
+        "",
+        "nodes that are not started but waited for by name, separated by spaces: block_detector (that of every "
+        "follower), follower_2/block_detector, ...",
+    ),
+    "stand_in_timeout": Argument("300", "how long they may take to appear, in seconds"),
     "bag": Argument("", "folder of the bag, which must not exist; empty: nothing is recorded"),
     "images": Argument("false", "record pictures too", _SWITCH),
     "rviz": Argument("false", "show the run in RViz, which must be installed; closing it doesn't end the run", _SWITCH),
@@ -79,6 +86,25 @@ def scenario_of(values: Mapping[str, str]) -> Scenario:
     scenario = scenarios.override(scenario, split_settings(values["set"]), source="set")
     scenario.check()
     return scenario
+
+
+def left_out(values: Mapping[str, str], scenario: Scenario) -> tuple[tuple[str, ...], float]:
+    """Return the nodes that somebody else starts, and how long to wait for them, in seconds.
+
+    Raises:
+        FormationError: naming the argument that is wrong.
+    """
+    text = values["stand_in_timeout"]
+    try:
+        timeout_s = float(text)
+    except ValueError:
+        timeout_s = 0.0
+    if not 0.0 < timeout_s <= LONGEST_S:
+        raise FormationError(f"stand_in_timeout:= can't be {shown(text)}; give seconds, above 0, {LONGEST_S:g} at most")
+    found = stand_ins_of(scenario, values["without"].replace(",", " ").split(), "without:=")
+    if LEADER_NODE in found:
+        raise FormationError("without:= can't leave out the leader, whose end is the run's; 'formation run' can")
+    return found, timeout_s
 
 
 def split_settings(text: str) -> list[str]:

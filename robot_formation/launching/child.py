@@ -8,8 +8,6 @@ import signal
 from collections.abc import Callable
 from pathlib import Path
 
-import yaml
-
 from robot_formation.experiment.run_result import NodeUsage
 from robot_formation.launching.fork_server import ForkServer
 from robot_formation.launching.outcome import manner
@@ -27,11 +25,8 @@ class Child:
 
     def __init__(self, process: Process, folder: Path, server: ForkServer, give_up: Callable[[], bool]) -> None:
         self.process = process
-        stem = process.name.strip("/").replace("/", "_")
-        self._log = folder / f"{stem}.log"
-        parameters = folder / f"{stem}.yaml"
-        content = {"/**": {"ros__parameters": process.ros_parameters()}}
-        parameters.write_text(yaml.safe_dump(content), encoding="utf-8")
+        self._log = folder / f"{process.stem}.log"
+        parameters = process.write_parameters(folder)
         arguments = ["--ros-args", "-r", f"__ns:={process.namespace}", "--params-file", str(parameters)]
         self._log.touch()
         self.pid = server.start(process.executable, arguments, self._log, give_up)

@@ -6,7 +6,12 @@ import os
 import sys
 from pathlib import Path
 
-from robot_formation.network.loopback import BEYOND, use_loopback
+from robot_formation.network.loopback import BEYOND, RANGE, use_loopback
+
+
+def joining(domain: int) -> str:
+    """Return the variables with which a program of the user's joins a run, as a shell takes them before a command."""
+    return f"ROS_DOMAIN_ID={domain} {RANGE}=LOCALHOST"
 
 
 def node_environment(domain: int, log_folder: Path) -> dict[str, str]:

@@ -181,7 +181,7 @@ def _import_own(executable: str) -> None:
     from robot_formation.components.catalogue import KINDS
 
     if executable in KINDS:
-        KINDS[executable].classes()
+        KINDS[executable].component_class()
     else:
         importlib.import_module(_RECORDER)
 

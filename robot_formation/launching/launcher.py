@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,12 +14,14 @@ from typing import TYPE_CHECKING
 from robot_formation import exit_codes
 from robot_formation.bag.bag_path import PARTIAL_SUFFIX, PathReservation, check_free, recover_hint
 from robot_formation.bag.errors import BagError
+from robot_formation.bag.writer import DEFAULT_OPTIONS, WriteOptions
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult, joined_reasons
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.experiment.stand_ins import LEADER_NODE, TIMEOUT_S, StandIns, how_to_start
 from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
-from robot_formation.launching.environment import node_environment
+from robot_formation.launching.environment import joining, node_environment
 from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
 from robot_formation.launching.outcome import holds_still, recorder_failed, verdict
 from robot_formation.launching.processes import RECORDER, Process, processes, viewer
@@ -65,8 +68,8 @@ def _clean_shared_memory(domain: int) -> None:
 def _how_to_drive(domain: int) -> str:
     """Return the command with which a person drives the leader of this run."""
     return (
-        f"drive the leader: ROS_DOMAIN_ID={domain} ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST ros2 run "
-        "teleop_twist_keyboard teleop_twist_keyboard --ros-args -p stamped:=true -r cmd_vel:=/leader/cmd_vel"
+        f"drive the leader: {joining(domain)} ros2 run teleop_twist_keyboard "
+        "teleop_twist_keyboard --ros-args -p stamped:=true -r cmd_vel:=/leader/cmd_vel"
     )
 
 
@@ -80,8 +83,11 @@ class Launcher:
         images: whether pictures are recorded too.
         say: takes the lines of progress.
         silence_s: wall seconds in which no robot does anything, after which the run is given up; longer in slow motion.
+        options: how the bag's files are written.
         reservation: of the bag's path, if it has been taken already; it is released at the end.
         view_port: where a viewer serves; None for no viewer. The run goes on without a viewer that has died.
+        stand_ins: nodes that somebody else starts, as `experiment.stand_ins` names them.
+        stand_in_timeout_s: how long the run waits for them.
     """
 
     scenario: Scenario
@@ -89,8 +95,11 @@ class Launcher:
     images: bool = False
     say: Callable[[str], None] = lambda text: None
     silence_s: float = 90.0
+    options: WriteOptions = DEFAULT_OPTIONS
     reservation: PathReservation | None = None
     view_port: int | None = None
+    stand_ins: Sequence[str] = ()
+    stand_in_timeout_s: float = TIMEOUT_S
     _children: list[Child] = field(default_factory=list, init=False)
     _signals: SignalCounter = field(default_factory=SignalCounter, init=False)
     _said_at: float = field(default=0.0, init=False)
@@ -137,7 +146,9 @@ class Launcher:
 
     def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""
-        table = processes(self.scenario, self.bag, images=self.images)
+        table = processes(self.scenario, self.bag, images=self.images, options=self.options, stand_ins=self.stand_ins)
+        elsewhere = [process for process in table if process.stand_in]
+        table = [process for process in table if not process.stand_in]
         announcement = None
         if self.view_port is not None:
             table.append(viewer(self.scenario, self.view_port))
@@ -146,14 +157,7 @@ class Launcher:
         from robot_formation.nodes.progress.monitor import Monitor  # here, since it needs the environment of the wheels
 
         began = time.monotonic()
-        scenario = self.scenario
-        progress = Progress(
-            scenario.slots,
-            scenario.leader.timesteps,
-            self._tell,
-            lambda: time.monotonic() - began,
-            delayed=scenario.setup.spacing is Spacing.DELAYED,
-        )
+        progress = self._progress(lambda: time.monotonic() - began)
         # The monitor joins first: the nodes then know of it before they send anything.
         with Monitor(environment, progress.topics, progress.listen) as monitor:
             try:
@@ -162,6 +166,7 @@ class Launcher:
                 interrupted = bool(self._signals.count)
                 return (exit_codes.INTERRUPTED, "interrupted") if interrupted else (exit_codes.NODE_DIED, str(error))
             watchdog = Watchdog([child.name for child in self._needed], idle_s=self._patience_s())
+            stand_ins = self._wait_for(elsewhere, folder, environment)
             while True:
                 monitor.spin(_POLL_S)
                 if announcement is not None:
@@ -174,12 +179,19 @@ class Launcher:
                 if ended is not None:
                     monitor.drain(_POLL_S, lambda: progress.complete)
                     return self._ended_by(ended, monitor)
-                if watchdog.due and (reason := self._look(watchdog, monitor)):
+                reason = self._look(stand_ins, watchdog, monitor)
+                if self._tour_ended(progress, monitor, gone=bool(reason)):
+                    return exit_codes.DONE, ""
+                if reason:
                     self._tell(f"{reason}; ending the run ...")
                     self._resume(monitor)
                     return exit_codes.NODE_DIED, reason
-                if time.monotonic() - self._said_at > _REMIND_S:
+                if not stand_ins.awaited and time.monotonic() - self._said_at > _REMIND_S:
                     progress.remind()
+
+    def _progress(self, elapsed: Callable[[], float]) -> Progress:
+        delayed = self.scenario.setup.spacing is Spacing.DELAYED
+        return Progress(self.scenario.slots, self.scenario.leader.timesteps, self._tell, elapsed, delayed=delayed)
 
     @property
     def _needed(self) -> list[Child]:
@@ -201,9 +213,41 @@ class Launcher:
         finally:
             self._resume(monitor)
 
-    def _look(self, watchdog: Watchdog, monitor: Monitor) -> str:
+    def _wait_for(self, elsewhere: list[Process], folder: Path, environment: dict[str, str]) -> StandIns:
+        """Tell how to start the nodes that somebody else starts, and begin to wait for them."""
+        nodes = [process.name for process in elsewhere]
+        if nodes:
+            files = [f"--params-file {shlex.quote(str(process.write_parameters(folder)))}" for process in elsewhere]
+            variables = joining(int(environment["ROS_DOMAIN_ID"]))
+            for line in how_to_start(nodes, self.stand_in_timeout_s, variables, files):
+                self._tell(line)
+        return StandIns(nodes, self.stand_in_timeout_s, self._tell)
+
+    def _tour_ended(self, progress: Progress, monitor: Monitor, *, gone: bool) -> bool:
+        """Return whether the tour of a leader that was started elsewhere is over: no node of ours ends with it.
+
+        Args:
+            progress: follows the run.
+            monitor: the messages, of which some may be on their way still.
+            gone: whether something has gone, which may be that leader.
+        """
+        if LEADER_NODE not in self.stand_ins:
+            return False
+        if gone:
+            monitor.drain(_POLL_S, lambda: progress.complete)
+        return progress.complete
+
+    def _look(self, stand_ins: StandIns, watchdog: Watchdog, monitor: Monitor) -> str:
+        """Return why the run can't go on, if it is time to look for that; the nodes stand while some are missing."""
+        if stand_ins.due and (reason := stand_ins.look(monitor.nodes())):
+            return reason
+        if stand_ins.awaited or not watchdog.due:
+            return ""
         states = {child.name: child.state for child in self._needed}
-        return watchdog.look(states, monitor.reports, monitor.messages + monitor.pauses)
+        reason = watchdog.look(states, monitor.reports, monitor.messages + monitor.pauses)
+        if reason and self.stand_ins:
+            reason += f"; started elsewhere: {', '.join(self.stand_ins)}"
+        return reason
 
     def _resume(self, monitor: Monitor) -> None:
         """Let stopped nodes go on, so that they end in good order; a recorder first takes what was kept for it."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 from robot_formation import exit_codes
 from robot_formation.launching.processes import RECORDER
-from robot_formation.names import ONLOOKERS
+from robot_formation.names import ONLOOKERS, PROGRESS
 
+_MISSING = "a node that was to be started elsewhere is missing or gone: progress has said which"
 _WORDS = {exit_codes.DONE: "done", exit_codes.LOST: "lost", exit_codes.INTERRUPTED: "interrupted"}
 
 
@@ -32,6 +33,11 @@ def recorder_failed(executable: str, code: int | None) -> bool:
 def holds_still(executable: str, code: int | None) -> bool:
     """Return whether a node is the fine-tuner of a follower that has lost its neighbour."""
     return executable == "fine_tuner" and code == exit_codes.LOST
+
+
+def misses_stand_in(executable: str, code: int | None) -> bool:
+    """Return whether a node is the progress of a launched run, and says that a node started elsewhere is missing."""
+    return executable == PROGRESS and code == exit_codes.NODE_DIED
 
 
 def manner(code: int) -> str:
@@ -66,13 +72,14 @@ class LaunchedRun:
             stopping: whether everything that was launched had been told to end.
         """
         self._ended += 1
-        if executable in ONLOOKERS:
+        if executable in ONLOOKERS and not misses_stand_in(executable, code):
             return False  # nothing of the run needs it
         first = self.exit_code is None
         if first:
             self.exit_code = exit_codes.INTERRUPTED if stopping else verdict(executable, code)
             if self.exit_code not in (exit_codes.DONE, exit_codes.INTERRUPTED):
-                self.reason = f"{name} {manner(code)}"
+                missing = misses_stand_in(executable, code)
+                self.reason = _MISSING if missing else f"{name} {manner(code)}"
         if holds_still(executable, code) and self.exit_code == exit_codes.DONE:
             self.exit_code, self.reason = exit_codes.LOST, f"{name} {manner(code)}"
         if recorder_failed(executable, code) and self.exit_code in _WORDS:

@@ -29,7 +29,7 @@ from robot_formation.calibration.motor_moves import calibrate_motors
 from robot_formation.calibration.rig import CalibrationRig
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
-from robot_formation.experiment import sweep
+from robot_formation.experiment import sweep, sweep_runs
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.launching.processes import run_metadata
@@ -189,7 +189,7 @@ def carry_out_work(work: Work, picture_format: str, say: Callable[[str], None]) 
     for track, predictor in _record(work, bags):
         progress.add(BAG_S, f"recorded track {track}, {predictor}")
     for name, missing in tasks.items():
-        for row in sweep.carry_out(missing, work.settings, min(work.jobs, len(missing))) if missing else ():
+        for row in sweep_runs.carry_out(missing, work.settings, min(work.jobs, len(missing))) if missing else ():
             tables[name].add(row)
             progress.add(RUN_S, "runs over seeds")
     tolerance_m = bench.fine_tuner.alignment.u_tolerance_m

@@ -9,7 +9,7 @@ import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from robot_formation.bag.run_details import mapping, node_parameters, said_slots
+from robot_formation.bag.run_details import mapping, node_parameters, said_slots, stand_ins
 from robot_formation.components.catalogue import KINDS
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
@@ -70,7 +70,8 @@ def _found(details: Mapping[str, str], nodes: dict[str, JsonObject]) -> tuple[Re
     own = scenario.by_node()
     gone = [f"{node}.{name}" for node in KINDS for name in nodes[node] if name not in own[node]]
     missed = (*(name for name, _ in _other(nodes, scenario)), *gone)
-    return Repetition(shlex.join([*words, *_as_options(settings)]), missed), scenario
+    without = [word for node in stand_ins(details) for word in ("--without", node)]
+    return Repetition(shlex.join([*words, *_as_options(settings), *without]), missed), scenario
 
 
 def _with(scenario: Scenario, settings: list[str]) -> tuple[Scenario, list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -94,7 +95,7 @@ def _what(sweep: Sweep) -> Iterator[Element]:
         ("predictors", ", ".join(plan.predictors)),
         ("seeds", f"{len(plan.seeds)}, from {min(plan.seeds)} to {max(plan.seeds)}"),
         ("conditions", _conditions(plan)),
-        ("settings of all sweeps", ", ".join(CONDITIONS)),
+        *([] if plan.base else [("settings of all sweeps", ", ".join(CONDITIONS))]),
         ("settings of this sweep", ", ".join(plan.settings) or "none"),
     ]
     yield table("What was run", ("what", "values"), rows, class_="words")
@@ -181,7 +182,15 @@ def _interval(found: dict[str, float | None] | None, scale: float, digits: int) 
 
 
 def repeating_command(plan: Plan) -> str:
-    """Return the command that repeats a sweep, for a shell."""
+    """Return the command that repeats a sweep, for a shell; for Python, if it is of a scenario of one's own."""
+    if plan.base:
+        lists = ("predictors", "seeds", "surfaces", "paths")
+        chosen = ", ".join(f"{name}={list(getattr(plan, name))}" for name in lists)
+        return (
+            "import robot_formation as rf\n"
+            f"scenario = rf.Scenario.from_dict({json.loads(plan.base)})\n"
+            f"rf.sweep(scenario, {chosen})"
+        )
     words = ["formation", "sweep", "--tracks", ",".join(plan.tracks), "--surfaces", ",".join(plan.surfaces)]
     if plan.paths != (STRAIGHT,):
         words += ["--paths", ",".join(plan.paths)]

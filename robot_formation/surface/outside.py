@@ -41,14 +41,18 @@ class _Heights(GradientNormal):
         return np.asarray(np.vectorize(self.height, otypes=[float])(xs, ys))
 
 
-@cache
 def outside_surface(name: str) -> type[Any]:
     """Import the surface class of this name, and complete it.
 
     Raises:
         PluginError: if it can't be imported, or is no surface.
     """
-    return completed_surface(name, plugins.load(KIND, name))
+    return _completed(name, plugins.load(KIND, name))
+
+
+@cache
+def _completed(name: str, kind: type) -> type[Any]:
+    return completed_surface(name, kind)
 
 
 def make_outside_surface(name: str, parameters: Mapping[str, Json]) -> Surface:

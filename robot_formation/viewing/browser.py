@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from typing import Any
 
 from robot_formation.errors import FormationError
+from robot_formation.extras import require
 
 HOST = "127.0.0.1"
 """Only browsers of this machine get in: nobody is asked for a password."""
 DEFAULT_PORT = 8080
-_REMEDY = "pip install 'robot_formation[view]' or, on its own, pip install viser; ./formation in a checkout installs it"
 
 
 class ViewError(FormationError):
@@ -32,7 +32,8 @@ def check_viewer(port: int) -> int:
         The port, which is free now.
 
     Raises:
-        ViewError: viser isn't installed, or the port can't be used.
+        MissingExtraError: viser isn't installed.
+        ViewError: it can't be imported, or the port can't be used.
     """
     _viser()
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
@@ -97,10 +98,9 @@ def _quiet() -> contextlib.AbstractContextManager[object]:
 
 
 def _viser() -> Any:
+    require("view")
     try:
         import viser
     except ImportError as error:
-        absent = isinstance(error, ModuleNotFoundError) and error.name == "viser"
-        what = "is not installed" if absent else f"can't be imported ({error})"
-        raise ViewError(f"the view needs viser, which {what}: {_REMEDY}") from error
+        raise ViewError(f"viser can't be imported ({error}): pip install --force-reinstall viser") from error
     return viser

@@ -12,14 +12,18 @@ from robot_formation.leader.paths.base import PathKind
 KIND = "path"
 
 
-@cache
 def outside_path(name: str) -> type[PathKind]:
     """Import the family of paths of this name, and complete it.
 
     Raises:
         PluginError: if it can't be imported, or is no path.
     """
-    return completed_path(name, plugins.load(KIND, name))
+    return _completed(name, plugins.load(KIND, name))
+
+
+@cache
+def _completed(name: str, kind: type) -> type[PathKind]:
+    return completed_path(name, kind)
 
 
 def completed_path(name: str, kind: type[Any]) -> type[PathKind]:

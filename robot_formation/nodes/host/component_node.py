@@ -15,8 +15,13 @@ import rclpy
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.duration import Duration
-from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.exceptions import (
+    InvalidParameterException,
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+)
 from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
@@ -60,6 +65,21 @@ def qos_profile(qos: names.Qos) -> QoSProfile:
         history=HistoryPolicy[qos.history.upper()],
         depth=qos.depth,
     )
+
+
+def node_names(node: Node) -> set[str]:
+    """Return the full names of the nodes in a node's graph that have a publisher or a subscription.
+
+    One without has gone: the middleware may list it for good if its last words came after its farewell.
+    """
+    found = set()
+    for name, namespace in node.get_node_names_and_namespaces():
+        with contextlib.suppress(NodeNameNonExistentError):
+            if node.get_publisher_names_and_types_by_node(
+                name, namespace
+            ) or node.get_subscriber_names_and_types_by_node(name, namespace):
+                found.add(names.absolute(namespace, name))
+    return found
 
 
 def main_of(kind: str) -> int:
@@ -147,6 +167,7 @@ class Host:
         self._transform_topics = transform_topics() if kind == "world" else []
         self._transforms = LiveTransforms(node.get_namespace()) if self._transform_topics else None
         self._publishers: dict[names.Topic, Message] = {}
+        self._awaited = [names.absolute(home, name) for name in self._parameters.wait_for_nodes]
         self._heard_s = time.monotonic()
         self._failure: FormationError | None = None
         self._connect()
@@ -186,11 +207,12 @@ class Host:
 
     def run(self) -> int:
         """Spin until the component finishes or a signal comes; then make sure that everything sent has arrived."""
+        self._await_nodes()
         executor = make_executor()
         executor.add_node(self._node)
         component, outbox = self._component, self._outbox
-        component.start()
         if not stopped():
+            component.start()
             self._say(0, self._ready())
         try:
             while not stopped() and (component.exit_code is None or outbox.waiting):
@@ -217,6 +239,17 @@ class Host:
             executor.shutdown()
             component.close()
         return component.exit_code or component.held_code
+
+    def _await_nodes(self) -> None:
+        """Wait until the nodes without which this one may not begin are there; messages are kept meanwhile."""
+        missing = self._awaited
+        if missing:
+            self._say(0, f"waiting for {', '.join(missing)}")
+        while missing and not stopped():
+            time.sleep(_IDLE_S)
+            present = node_names(self._node)
+            missing = [name for name in missing if name not in present]
+        self._heard_s = time.monotonic()
 
     def _send(self, topic: names.Topic, message: Message) -> None:
         # Transforms first: a recorder that gets the message has found their topics, and makes none of its own.

@@ -55,6 +55,11 @@ class HostParameters:
     )
     recorder: str = parameter("", "Name of a recorder that must listen too before anything is sent; empty: none")
     record_images: bool = parameter(False, "Whether that recorder records images")
+    wait_for_nodes: tuple[str, ...] = parameter(
+        (),
+        "Nodes that must be in the graph before this one begins, like follower_1/block_detector; if relative, in the "
+        "namespace that the robots' lie in",
+    )
 
 
 class ParameterNode(Node):

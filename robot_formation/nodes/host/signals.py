@@ -8,7 +8,8 @@ import sys
 from collections.abc import Iterator
 
 from robot_formation import exit_codes
-from robot_formation.network.shared_memory_space import SharedMemoryError, require_space
+from robot_formation.errors import FormationError
+from robot_formation.network.loading_ros import require_ros
 from robot_formation.system.signal_handling import ENDING, SignalCounter
 
 _LONGEST_END_S = 20
@@ -23,8 +24,8 @@ def stop_on_signals() -> None:
     """
     _signals.install()
     try:
-        require_space()
-    except SharedMemoryError as error:
+        require_ros()
+    except FormationError as error:
         print(error, file=sys.stderr)
         raise SystemExit(exit_codes.BAD_INPUT) from None
 

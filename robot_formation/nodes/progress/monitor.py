@@ -18,7 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from robot_formation import conversions, names
 from robot_formation.names import Message
 from robot_formation.network.loopback import BEYOND, PROFILES, RANGE
-from robot_formation.nodes.host.component_node import qos_profile
+from robot_formation.nodes.host.component_node import node_names, qos_profile
 from robot_formation.nodes.host.executor import make_executor
 
 # Nodes whose names begin with an underscore are hidden: nobody waits for them, and lists leave them out.
@@ -113,6 +113,10 @@ class Monitor:
             quiet = quiet + 1 if self.messages == before else 0
             if quiet == _QUIET_ROUNDS:
                 return
+
+    def nodes(self) -> set[str]:
+        """Return the full names of the nodes that are in the graph."""
+        return node_names(self._node)
 
     def __enter__(self) -> Monitor:
         return self
