@@ -19,6 +19,11 @@ from robot_formation.paths import config_dir
 if TYPE_CHECKING:  # it imports rclpy
     from graph_lab import Lab
 
+pytest_plugins = ("hanging_tests", "crashed_workers")
+
+MOST_ID = 100
+"""How many characters of a value an id shows: as in pytest 9. Older ones have no limit; a picture had 40 million."""
+
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
@@ -29,15 +34,24 @@ for variable in PROFILES:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option with which continuous integration runs."""
-    parser.addoption("--retry-graph", action="store_true", help="try tests of the node graph that fail once more")
+    parser.addoption("--retry-graph", action="store_true", help="try tests that start processes and fail once more")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests of the node graph for pytest-rerunfailures, whose reruns the summary lists (-rR)."""
+    """Mark the tests that start processes for pytest-rerunfailures, whose reruns the summary lists (-rR)."""
     if config.getoption("--retry-graph"):
         for item in items:
-            if item.get_closest_marker("graph"):
+            if item.get_closest_marker("graph") or _starts_processes(item):
                 item.add_marker(pytest.mark.flaky(reruns=1))
+
+
+def _starts_processes(item: pytest.Item) -> bool:
+    return isinstance(item, pytest.Function) and hasattr(item.module, "subprocess")
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Let an id name the argument where its value is long."""
+    return argname if isinstance(val, str | bytes) and len(val) > MOST_ID else None
 
 
 @pytest.fixture

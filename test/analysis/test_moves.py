@@ -1,6 +1,5 @@
 """Moves by axis and kind, and losses of the neighbour, of runs whose truth is known."""
 
-import json
 import math
 from collections import Counter
 from pathlib import Path
@@ -12,7 +11,7 @@ from hypothesis import strategies as st
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.moves import UNKNOWN, Loss, losses, lost_at, move_totals, moves_of, summed
 from robot_formation.analysis.quantities import FollowerAnalysis, analyse
-from robot_formation.analysis.report import text_report, to_json
+from robot_formation.analysis.report import text_report
 from robot_formation.analysis.run_record import FollowerRecord, RunRecord, Stamped
 from robot_formation.bag.message_recorder import Recorder
 from robot_formation.experiment.in_memory_record import run_in_memory
@@ -228,7 +227,7 @@ def test_a_bag_and_the_run_in_memory_give_the_same_analysis(tmp_path: Path) -> N
     assert follower == in_memory.followers[0]
     assert len(follower.commands) == len(follower.moved) > 4
     assert list(follower.state_stamps_ns) == sorted(follower.state_stamps_ns)
-    assert json.loads(to_json(analyse(from_bag)))["timesteps"] == json.loads(to_json(analyse(in_memory)))["timesteps"]
+    assert analyse(from_bag).to_json()["timesteps"] == analyse(in_memory).to_json()["timesteps"]
 
 
 def test_a_follower_that_gave_up_is_told_with_timestep_time_and_reason() -> None:

@@ -159,7 +159,7 @@ def test_a_run_cut_before_its_first_timestep_has_no_rows_and_no_sums(tmp_path: P
 
 def test_json_is_strict_also_for_residuals_that_nobody_saw(tmp_path: Path) -> None:
     steps = [Step(residual=(math.nan, math.nan), prediction=(math.nan, 0.0)), Step()]
-    rows = json.loads(to_json(analysed(tmp_path, steps)))["timesteps"]
+    rows = json.loads(to_json(analysed(tmp_path, steps).to_json()))["timesteps"]
     assert rows[0]["residual_u_m"] is None
     assert rows[1]["predicted_v_m"] is None
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robot_formation.analysis import markdown
 from robot_formation.analysis.sweep_summary import MEDIANS, median_with_interval, summarise, table
 
 
@@ -280,3 +281,9 @@ def test_the_table_is_in_centimetres_and_percent() -> None:
         "| two | bowl | formation | 1 | 0 | 10.0 (10.0..10.0) | 75 (75..75) "
         "| 1.00 (1.00..1.00) | 1.50 (1.50..1.50) | 90 |"
     )
+
+
+def test_a_cell_has_the_median_its_interval_and_no_negative_zero() -> None:
+    assert markdown.interval({"median": 0.125, "low": -0.0004, "high": None}, 100.0) == "12.5 (0.0..lost)"
+    assert markdown.interval(None) == "-"
+    assert markdown.table(["a", "b"], [["1", "2"]]) == ["| a | b |", "|---|---|", "| 1 | 2 |"]

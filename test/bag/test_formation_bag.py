@@ -11,7 +11,6 @@ from cli_tools import complaint
 from repository import ROOT
 from robot_formation.analysis.from_bag import load_displacements, load_run
 from robot_formation.analysis.quantities import analyse
-from robot_formation.analysis.report import to_json
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag, formation_namespaces
 from robot_formation.bag.message_recorder import METADATA_NAME
@@ -55,7 +54,7 @@ def test_a_run_below_a_namespace_is_found_and_gives_the_same_figures(
     moved_to: Callable[..., Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     bag = moved_to("/site_a")
-    assert to_json(analyse(load_run(bag))) == to_json(analyse(load_run(SAMPLE)))
+    assert analyse(load_run(bag)).to_json() == analyse(load_run(SAMPLE)).to_json()
     assert load_displacements(bag, "follower_1").displacements_m == pytest.approx(
         load_displacements(SAMPLE, "follower_1").displacements_m, abs=0.0
     )

@@ -21,6 +21,7 @@ def options(*words: str) -> Namespace:
     return parsed
 
 
+@pytest.mark.long
 def test_no_input_ends_in_a_traceback_or_takes_a_gigabyte() -> None:
     results = fuzz_inputs.run_all(options(), range(FIRST, FIRST + CASES))
     failures = [fuzz_inputs.report(result, 0) for result in results if result["wrong"]]

@@ -13,7 +13,7 @@ import pytest
 from _pytest.capture import CaptureResult
 
 from robot_formation.cli.main import main
-from robot_formation.experiment import sweep
+from robot_formation.experiment import sweep_runs
 from robot_formation.paper import work as work_module
 from robot_formation.paper.statements import FIGURES
 
@@ -96,7 +96,7 @@ def test_another_call_measures_nothing_and_draws_in_another_format(
 
     for name in ("calibrate_motors", "measure_encoders", "carry_out", "record_run"):
         monkeypatch.setattr(work_module, name, never)
-    monkeypatch.setattr(sweep, "carry_out", never)
+    monkeypatch.setattr(sweep_runs, "carry_out", never)
     code, said = call(capsys, "--out", made, "--format", "svg", "--json", *QUICK)
     assert code == 0
     found = json.loads(said.out)

@@ -27,7 +27,7 @@ def test_the_list_of_paths_has_their_parameters_with_defaults(capsys: pytest.Cap
         (["run", "--path", "circle", "--set", "leader.path_parameters=[perid=3]"], "did you mean 'period'?"),
         (["run", "--path", "slalom", "--set", "leader.timesteps=90"], "leader would leave the plate"),
         (["run", "--path", "waypoints"], "name its CSV file"),
-        (["run", "--path", "teleop", "--in-process"], "leave --in-process out"),
+        (["run", "--path", "teleop", "--in-process"], "without --in-process"),
         (["run", "--set", "leader.seed=3"], "'seed' follows from the scenario; set 'seed' instead"),
         (["sweep", "--paths", "circel"], "no path 'circel'; did you mean 'circle'?"),
         (["sweep", "--paths", "teleop"], "no path 'teleop'"),

@@ -213,7 +213,7 @@ def test_displacements_beyond_the_bounds_of_forecasts_are_warned_of(
         (["--set", "predictor.forgeting=0.9"], ["'forgeting'", "'forgetting'"]),
         (["--set", "predictor.forgetting=2"], ["forgetting", "outside"]),
         (["--set", "predicter.forgetting=0.9"], ["'predicter'", "'predictor'"]),
-        (["--set", "predictor.name=ewma"], ["--predictors NAME"]),
+        (["--set", "predictor.name=ewma"], ["name predictors by --predictors"]),
         (["--set", "seed=3"], ["seed=3", "predictor."]),
         (["--set", "leader.timesteps=3"], ["leader.timesteps", "predictor."]),
         (["--set", "predictor.forgetting"], ["KEY=VALUE"]),

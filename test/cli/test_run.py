@@ -33,6 +33,16 @@ FAST = ("--camera", "on_demand", "--in-process")
         (("run", "--set", "world.camera.min_frames_per_second=31"), ["min_frames_per_second", "240"]),
         (("run", "--set", "world.surface_parameters=[depth=1]"), ["depth"]),
         (("run", "--seed", "-1"), ["seed"]),
+        (("run", "--without", "block_detektor"), ["--without", "'block_detektor'", "did you mean 'block_detector'"]),
+        (
+            ("run", "--without", "follower_2/drive"),
+            ["--without", "'follower_2/drive'", "did you mean 'follower_1/drive'"],
+        ),
+        (("run", "--without", "predictor", "--in-process"), ["--without", "--in-process"]),
+        (("run", "--stand-in-timeout", "3"), ["--stand-in-timeout", "--without"]),
+        (("run", "--without", "world", "--stand-in-timeout", "0"), ["--stand-in-timeout", "'0'", "above 0"]),
+        (("run", "--max-size", "0"), ["--max-size", "'0'", "above 0"]),
+        (("run", "--max-duration", "long"), ["--max-duration", "'long'"]),
         (("run", "--real-time-factor", "-1"), ["--real-time-factor", "outside"]),
         (("run", "--track", "one", "--scenario", "x.yaml"), ["not allowed with"]),
         (("run", "--scenario", "missing.yaml"), ["missing.yaml", "No such file"]),
@@ -142,6 +152,28 @@ def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_pa
         assert "/follower_1/blocks" in opened.topics
         assert "/follower_1/camera/image_raw" not in opened.topics
         assert opened.metadata("robot_formation")["predictor"] == "formation"
+
+
+@pytest.mark.parametrize("where", ["process", pytest.param("graph", marks=pytest.mark.graph)])
+@pytest.mark.xdist_group("cli_run")
+def test_a_split_bag_is_the_same_run_in_several_files(tmp_path: Path, where: str) -> None:
+    options = ["--camera", "on_demand", "--set", "leader.timesteps=4", "--json"]
+    options += ["--in-process"] if where == "process" else []
+    found = []
+    for name, split in (("whole", ()), ("split", ("--max-duration", "10"))):
+        completed = formation("run", "--bag", tmp_path / name, *options, *split)
+        assert completed.returncode == 0, completed.stderr
+        found.append(json_of(completed))
+        assert found[-1].pop("bag") == str(tmp_path / name)
+    assert found[0] == found[1]
+    files = sorted(path.name for path in (tmp_path / "split").glob("*.mcap"))
+    assert files[:2] == ["split_0.mcap", "split_1.mcap"]
+    assert len(list((tmp_path / "whole").glob("*.mcap"))) == 1
+    with read_bag(tmp_path / "split") as split_bag, read_bag(tmp_path / "whole") as whole_bag:
+        assert set(split_bag.topics) == set(whole_bag.topics)
+        for topic in ("/follower_1/blocks", "/follower_1/moved", "/ground_truth/leader/odom"):
+            one, other = ([str(m.message) for m in bag.messages([topic])] for bag in (split_bag, whole_bag))
+            assert one == other
 
 
 @pytest.mark.graph

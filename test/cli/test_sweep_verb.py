@@ -3,7 +3,8 @@
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,9 +16,10 @@ from _pytest.capture import CaptureResult
 from robot_formation import paths
 from robot_formation.batch.resumable_table import ResumableTable
 from robot_formation.cli.main import main
-from robot_formation.cli.sweep import default_folder, seeds_text
-from robot_formation.experiment import sweep
+from robot_formation.cli.sweep import default_folder
+from robot_formation.experiment import sweep, sweep_runs
 from robot_formation.experiment.sweep import Row, Task
+from robot_formation.experiment.sweep_results import seeds_text
 
 pytestmark = pytest.mark.slow
 
@@ -44,7 +46,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Task]:
         correction_m = 0.3 if task.predictor == "previous" else 0.1 + 0.001 * (task.seed % 10)
         return Row(*task, "done", 15, correction_m, *[0.01] * 7)
 
-    monkeypatch.setattr(sweep, "run_task", run_task)
+    monkeypatch.setattr(sweep_runs, "run_task", run_task)
     return tasks
 
 
@@ -165,7 +167,7 @@ def test_a_real_sweep_from_the_command_to_the_numbers(capsys: pytest.CaptureFixt
 def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = sweep.carry_out
+    whole = sweep_runs.carry_out
 
     def interrupted(tasks: Sequence[Task], settings: Sequence[str], jobs: int) -> Iterator[Row]:
         for number, row in enumerate(whole(tasks, settings, jobs)):
@@ -174,7 +176,7 @@ def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(
             yield row
 
     arguments = (*CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
-    monkeypatch.setattr(sweep, "carry_out", interrupted)
+    monkeypatch.setattr(sweep_runs, "carry_out", interrupted)
     code, said = call(capsys, *arguments)
     assert (code, said.out) == (130, "")
     assert said.err.splitlines()[-1] == (
@@ -183,7 +185,7 @@ def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(
     assert len(rows_of(tmp_path / "out")) == 4
     assert not (tmp_path / "out" / "summary.json").exists()
 
-    monkeypatch.setattr(sweep, "carry_out", whole)
+    monkeypatch.setattr(sweep_runs, "carry_out", whole)
     made.clear()
     code, said = call(capsys, *arguments)
     assert code == 0
@@ -197,14 +199,14 @@ def test_an_interrupted_sweep_ends_with_130_keeps_its_rows_and_goes_on(
 def test_a_run_that_fails_ends_the_sweep_with_one_line_and_keeps_the_others(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = sweep.run_task
+    whole: Callable[..., Row] = vars(sweep_runs)["run_task"]  # as `made` has patched it
 
     def run_task(task: Task, settings: Sequence[str]) -> Row:
         if len(made) == 3:
             raise sweep.SweepError("track two, seed 1001: the run stands still")
         return whole(task, settings)
 
-    monkeypatch.setattr(sweep, "run_task", run_task)
+    monkeypatch.setattr(sweep_runs, "run_task", run_task)
     code, said = call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out", "--json")
     assert (code, said.out) == (2, "")
     assert said.err.splitlines()[-1] == "formation sweep: track two, seed 1001: the run stands still"
@@ -278,7 +280,7 @@ def test_a_folder_of_something_else_or_other_settings_and_a_file_are_refused(
     assert "letter.txt" in complaint(capsys, *CHOICE, "--out", tmp_path / "letter.txt")
     call(capsys, *CHOICE, "--jobs", 1, "--out", tmp_path / "out")
     line = complaint(capsys, *CHOICE, *SHORT, "--out", tmp_path / "out")
-    assert line.endswith("other settings: it was made without --set leader.timesteps=4; choose another --out")
+    assert line.endswith("other settings: it was made without --set leader.timesteps=4; choose another folder")
     call(capsys, *CHOICE, *SHORT, "--jobs", 1, "--out", tmp_path / "short")
     other = ("--set", "leader.timesteps=5")
     line = complaint(capsys, *CHOICE, *other, "--out", tmp_path / "short")
@@ -313,9 +315,9 @@ def test_a_mistake_is_found_without_loading_dask_or_matplotlib() -> None:
 def test_dask_that_is_not_installed_is_said_with_the_command_that_installs_it(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, made: list[Task], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "dask.distributed", None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     line = complaint(capsys, *CHOICE, "--dask", "tcp://127.0.0.1:8786", "--out", tmp_path / "out")
-    assert line.endswith("--dask needs the package 'distributed'; pip install 'dask[distributed]'")
+    assert line.endswith("this needs Dask: pip install 'robot_formation[dask]'")
 
 
 def test_a_scheduler_that_does_not_answer_is_said(
@@ -343,19 +345,24 @@ def test_a_failure_to_connect_without_words_is_said_too(
     assert line.endswith("no Dask scheduler answers at tcp://10.0.0.1:8786: TimeoutError")
 
 
-@pytest.fixture(scope="module")
-def cluster() -> Iterator[str]:
+def small_cluster() -> Any:
+    """A cluster of one worker in this process."""
     distributed = pytest.importorskip("dask.distributed")
     options = {"processes": False, "n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
-    with distributed.LocalCluster(**options) as found:
+    return distributed.LocalCluster(**options)
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[str]:
+    with small_cluster() as found:
         yield found.scheduler_address
 
 
 def test_a_dask_cluster_yields_the_same_table_as_this_machine(cluster: str) -> None:
     tasks = [Task("two", "plane", "formation", seed) for seed in (1000, 1001)]
     settings = ("leader.timesteps=4",)
-    there = {row.task: repr(row) for row in sweep.carry_out_by_dask(tasks, settings, cluster)}
-    here = {row.task: repr(row) for row in sweep.carry_out(tasks, settings, 1)}
+    there = {row.task: repr(row) for row in sweep_runs.carry_out_by_dask(tasks, settings, cluster)}
+    here = {row.task: repr(row) for row in sweep_runs.carry_out(tasks, settings, 1)}
     assert there == here
 
 
@@ -363,8 +370,48 @@ def test_a_run_that_fails_on_a_dask_cluster_is_named(cluster: str, monkeypatch: 
     task = Task("two", "plane", "previous", 1000)
     stuck = ("leader.timesteps=4", "world.lockstep=[leader,follower_1]")
     with pytest.raises(sweep.SweepError, match=r"seed 1000: .*everybody waits"):
-        list(sweep.carry_out_by_dask([task], stuck, cluster))
+        list(sweep_runs.carry_out_by_dask([task], stuck, cluster))
     impossible: Any = partial(replace, 5)  # type: ignore[type-var]  # nothing that a worker could do
-    monkeypatch.setattr(sweep, "run_task", impossible)
+    monkeypatch.setattr(sweep_runs, "run_task", impossible)
     with pytest.raises(sweep.SweepError, match=r"a Dask worker can't do the runs: TypeError: .*goes on"):
-        list(sweep.carry_out_by_dask([task], (), cluster))
+        list(sweep_runs.carry_out_by_dask([task], (), cluster))
+
+
+def quick_run(task: Task, settings: Sequence[str]) -> Row:
+    """Make up a run, where a worker can find it."""
+    return Row(*task, "done", 15, *[0.01] * 8)
+
+
+def test_a_dask_cluster_that_goes_away_is_said_in_a_line_and_what_was_done_is_kept(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sweep_runs, "run_task", quick_run)
+    add = sweep.Table.add
+    with small_cluster() as cluster:
+
+        def add_and_close(table: sweep.Table, row: Row) -> None:
+            add(table, row)
+            cluster.close()  # the other runs are done, or not: their results are gone with the scheduler
+
+        monkeypatch.setattr(sweep.Table, "add", add_and_close)
+        address = cluster.scheduler_address
+        line = complaint(capsys, *CHOICE, "--dask", address, "--out", tmp_path / "out")
+    assert line == (
+        f"formation sweep: the Dask cluster at {address} is gone; the same command with the same --out goes on"
+    )
+    assert len(rows_of(tmp_path / "out")) == 1
+
+
+@pytest.mark.parametrize("problem", [OSError("lost"), TimeoutError("lost"), CancelledError("lost")], ids=repr)
+def test_a_scheduler_that_dies_while_a_result_is_fetched_is_gone(
+    cluster: str, monkeypatch: pytest.MonkeyPatch, problem: Exception
+) -> None:
+    distributed = pytest.importorskip("dask.distributed")
+
+    def fail(future: object) -> None:
+        raise problem
+
+    monkeypatch.setattr(sweep_runs, "run_task", quick_run)
+    monkeypatch.setattr(distributed.Future, "result", fail)
+    with pytest.raises(sweep.SweepError, match=r"the Dask cluster at .* is gone; .* goes on"):
+        list(sweep_runs.carry_out_by_dask([Task("two", "plane", "previous", 1000)], (), cluster))

@@ -27,6 +27,7 @@ CASES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("settings", CASES.values(), ids=CASES)
 def test_the_analysis_is_that_of_the_bag_of_the_same_run(tmp_path: Path, settings: list[str]) -> None:
     scenario = override(load_track("one"), [*BASE, *settings])
@@ -51,6 +52,26 @@ def test_a_short_run_is_done_and_a_lost_one_lost() -> None:
     assert (done.outcome, done.scenario) == ("done", "track_two")
     lost = analyse(run_in_memory(override(load_track("two"), [*BASE, "world.camera.pan_deg=-90"])))
     assert (lost.outcome, lost.followers[0].lost) == ("lost", True)
+
+
+def test_without_the_ground_the_analysis_is_the_same() -> None:
+    scenario = override(load_track("two"), [*BASE, "seed=3"])
+    whole, bare = run_in_memory(scenario), run_in_memory(scenario, ground=False)
+    assert whole.ground is not None
+    assert bare.ground is None
+    assert repr(analyse(bare).to_json()) == repr(analyse(whole).to_json())
+
+
+def test_what_nobody_hears_is_not_made() -> None:
+    scenario = override(load_track("two"), ["leader.timesteps=1", "world.camera.mode=on_demand"])
+    made: list[set[str]] = []
+    for heard in (None, {"/ground_truth/leader/odom"}, set[str]()):
+        topics: set[str] = set()
+        InProcessRun(scenario, listen=lambda topic, message, into=topics: into.add(topic), heard=heard).run()  # type: ignore[misc]
+        made.append(topics)
+    truth = {robot: {f"/ground_truth/{robot}/{kind}" for kind in ("odom", "pose", "path")} for robot in scenario.robots}
+    assert made[0] - made[1] == {"/surface"} | truth["follower_1"]
+    assert made[1] - made[2] == truth["leader"]
 
 
 def test_the_run_may_be_of_another_make_and_only_topics_of_the_analysis_are_kept() -> None:

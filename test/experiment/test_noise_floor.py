@@ -135,6 +135,7 @@ def closed() -> Story:
     return Story("seed=1000", close=True)
 
 
+@pytest.mark.long
 def test_the_noise_floor_is_below_the_correction_of_previous_on_a_plane() -> None:
     settings = ("leader.timesteps=10",)
     for seed in (1000, 1001):

@@ -1,7 +1,6 @@
 """The overhead camera and its tracker in runs, and their comparison with ground truth."""
 
 import dataclasses
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +14,7 @@ from robot_formation import conversions, names
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.from_bag import record_of as record_of_messages
 from robot_formation.analysis.quantities import analyse
-from robot_formation.analysis.report import text_report, to_json, write_pictures
+from robot_formation.analysis.report import text_report, write_pictures
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.components.base import Place
 from robot_formation.components.node_parameters import OverheadTrackerNodeParameters
@@ -42,7 +41,7 @@ def record_of(scenario: Scenario, bag: Path) -> RunRecord:
 @pytest.mark.parametrize("track", ["one", "two"])
 def test_the_good_calibration_stays_below_three_millimetres(tmp_path: Path, track: str) -> None:
     analysis = analyse(record_of(short_scenario(track=track), tmp_path / "bag"))
-    errors = json.loads(to_json(analysis))["totals"]["overhead_error_m"]
+    errors = analysis.to_json()["totals"]["overhead_error_m"]
     assert set(errors) == {"leader", "follower_1"}
     for error in errors.values():
         assert 0.0 < error["rms"] <= error["max"] < 0.003
@@ -102,7 +101,7 @@ def test_there_is_a_picture_of_the_start_and_of_every_rest() -> None:
 def test_a_run_without_tracker_has_no_overhead_error(tmp_path: Path) -> None:
     record = record_of(short_scenario("world.overhead.enabled=false", "leader.timesteps=1"), tmp_path / "bag")
     analysis = analyse(record)
-    assert json.loads(to_json(analysis))["totals"]["overhead_error_m"] is None
+    assert analysis.to_json()["totals"]["overhead_error_m"] is None
     assert "overhead camera" not in text_report(record, analysis)
 
 

@@ -15,6 +15,7 @@ from robot_formation import conversions, names
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.quantities import analyse
 from robot_formation.bag.reader import read_bag
+from robot_formation.experiment import progress as progress_lines
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.progress import Progress
 from robot_formation.geometry.slots import slot
@@ -92,7 +93,10 @@ def held_back(topics: Iterable[str], order: Sequence[str], late: str, count: int
 
 
 @pytest.mark.parametrize("name", ["two_followers", *SAMPLES])
-def test_every_line_says_what_the_table_says_in_any_order_of_the_topics(runs: dict[str, Path], name: str) -> None:
+def test_every_line_says_what_the_table_says_in_any_order_of_the_topics(
+    runs: dict[str, Path], name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress_lines, "_FORGOTTEN_AT_ONCE", 0)  # forget as early as can be
     bag = runs[name]
     expected = table_of(bag)
     followers, timesteps = len({robot for robot, _ in expected}), max(t for _, t in expected)
@@ -119,6 +123,20 @@ def test_the_timesteps_of_a_follower_are_told_in_order(runs: dict[str, Path]) ->
     messages = messages_of(bag, Progress([slot(0.32)], 15, print, lambda: 0.0))
     order = [topic for topic, group in messages.items() for _ in group]
     assert [t for (_, t), _ in told(messages, 1, 15, order)] == list(range(1, 16))
+
+
+def test_timesteps_that_were_told_are_forgotten(runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress_lines, "_FORGOTTEN_AT_ONCE", 0)
+    progress = Progress([slot(0.32)], 15, lambda text: None, lambda: 0.0)
+    most = 0
+    with read_bag(runs["track_one_previous"]) as opened:
+        for message in opened.raw_messages(progress.topics):
+            progress.listen(message.topic, conversions.from_cdr(message.cdr, opened.topics[message.topic]))
+            heard = progress._heard.values()
+            most = max(most, *(len(e.kept) for h in heard for e in (h.poses, h.moves, h.timesteps)))
+    assert progress.complete
+    heard_poses = max(len(heard.poses) for heard in progress._heard.values())
+    assert most < 20 < 40 < heard_poses  # those of three timesteps
 
 
 def test_a_move_that_could_not_be_measured_does_not_silence_the_run(runs: dict[str, Path]) -> None:

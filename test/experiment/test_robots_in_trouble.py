@@ -129,6 +129,7 @@ def assert_stand_apart(found: RunRecord) -> None:
     assert all(math.dist(a, b) > 0.25 for a, b in itertools.pairwise(ends))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("settings", LOST)
 def test_a_pushed_robot_comes_back_and_those_on_its_left_notice_nothing(settings: tuple[str, ...]) -> None:
     plain, pushed = record(*settings), record(*settings, PUSH)
@@ -179,6 +180,7 @@ def test_one_follower_may_be_blind_alone() -> None:
         assert error_m < 0.02
 
 
+@pytest.mark.long
 def test_a_replay_knows_whose_cameras_were_closed(tmp_path: Path) -> None:
     chosen = scenario("followers=2", "leader.timesteps=3", "blackouts=[[follower_2, 2, 1]]")
     assert run_in_process(chosen, tmp_path / "run", run_metadata(chosen)).exit_code == exit_codes.DONE

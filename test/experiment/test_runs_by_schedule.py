@@ -157,6 +157,23 @@ def test_a_third_robots_marker_is_hidden() -> None:
     assert max(follower.totals["formation_error_rmse_m"] for follower in found.followers) < 0.02
 
 
+def test_edges_before_a_light_board_are_known() -> None:
+    """Without that a follower of a chain stands 6 mm too near."""
+
+    def bottom_px(*settings: str) -> float:
+        return scenario(*settings).fine_tuner.precise.edges.target_bottom_px
+
+    alone = bottom_px("followers=1")
+    assert bottom_px("followers=2") < alone - 0.5
+    assert bottom_px("followers=2", "schedule=timer", "spacing=delayed") == alone  # a dark board
+    assert bottom_px("followers=2", "world.marker.backdrop_m=0") == alone
+    assert bottom_px("followers=2", "fine_tuner.precise.edges.target_bottom_px=-1") == -1.0
+    late = analysed("followers=2").followers[0].timesteps[3:]
+    off_u_m = [t.error_uv_m[0] for t in late if t.error_uv_m is not None]
+    assert len(off_u_m) == 3
+    assert abs(float(np.mean(off_u_m))) < 0.004
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from robot_formation.cli.sweep import seeds
 from robot_formation.errors import FormationError
-from robot_formation.experiment import sweep
+from robot_formation.experiment import sweep, sweep_runs
 from robot_formation.experiment.sweep import Plan, Row, SweepError, Table, Task
 from robot_formation.koopman.predictors import NAMES
 
@@ -210,7 +210,7 @@ def test_another_file_in_the_tables_place_is_refused_and_kept(tmp_path: Path, co
 
 def test_a_folder_with_something_else_is_refused_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("years of work")
-    with pytest.raises(SweepError, match="is not empty and holds no sweep; choose another --out"):
+    with pytest.raises(SweepError, match="is not empty and holds no sweep; choose another folder"):
         Table(tmp_path, PLAN)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
 
@@ -227,7 +227,7 @@ def test_a_sweep_with_other_settings_is_refused_and_kept(tmp_path: Path) -> None
     filled(tmp_path)
     before = lines_of(tmp_path)
     other = replace(PLAN, settings=("leader.timesteps=5",))
-    with pytest.raises(SweepError, match=r"other settings.*leader\.timesteps=4.*choose another --out"):
+    with pytest.raises(SweepError, match=r"other settings.*leader\.timesteps=4.*choose another folder"):
         Table(tmp_path, other)
     assert lines_of(tmp_path) == before
     assert json.loads((tmp_path / "sweep.json").read_text())["settings"] == list(SHORT)
@@ -250,7 +250,7 @@ def test_more_seeds_and_predictors_go_on_in_the_same_folder(tmp_path: Path) -> N
 
 @pytest.fixture(scope="module")
 def one_job() -> dict[Task, Row]:
-    return {row.task: row for row in sweep.carry_out(PLAN.tasks(), SHORT, 1)}
+    return {row.task: row for row in sweep_runs.carry_out(PLAN.tasks(), SHORT, 1)}
 
 
 def test_every_task_yields_its_row(one_job: dict[Task, Row]) -> None:
@@ -261,9 +261,10 @@ def test_every_task_yields_its_row(one_job: dict[Task, Row]) -> None:
     assert len({row.formation_error_rmse_m for row in one_job.values()}) == 4
 
 
+@pytest.mark.long
 def test_the_rows_do_not_depend_on_the_number_of_jobs_nor_on_the_order(one_job: dict[Task, Row]) -> None:
     tasks = list(PLAN.tasks())[::-1]
-    two_jobs = {row.task: row for row in sweep.carry_out(tasks, SHORT, 2)}
+    two_jobs = {row.task: row for row in sweep_runs.carry_out(tasks, SHORT, 2)}
     assert {task: repr(row) for task, row in two_jobs.items()} == {task: repr(row) for task, row in one_job.items()}
 
 
@@ -279,7 +280,7 @@ def test_a_resumed_sweep_has_the_same_table_byte_for_byte_and_runs_only_what_is_
     table = Table(tmp_path / "resumed", PLAN)
     missing = sweep.remaining(PLAN, table.rows)
     assert missing == list(PLAN.tasks())[2:]
-    for row in sweep.carry_out(missing, SHORT, 1):
+    for row in sweep_runs.carry_out(missing, SHORT, 1):
         table.add(row)
     assert lines_of(tmp_path / "resumed") == lines_of(tmp_path / "whole")
     assert sweep.remaining(PLAN, table.rows) == []
@@ -295,4 +296,4 @@ def test_a_run_that_stands_still_is_named(jobs: int) -> None:
     task = Task("two", "plane", "previous", 1000)
     words = "track two, surface plane, predictor previous, seed 1000: .*everybody waits"
     with pytest.raises(SweepError, match=words):
-        list(sweep.carry_out([task], (*SHORT, "world.lockstep=[leader,follower_1]"), jobs))
+        list(sweep_runs.carry_out([task], (*SHORT, "world.lockstep=[leader,follower_1]"), jobs))

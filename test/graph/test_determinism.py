@@ -36,6 +36,7 @@ def test_the_node_graph_gives_the_in_process_run(
     assert displacements(tmp_path / "bag") == in_process[mode]
 
 
+@pytest.mark.long
 def test_loaded_cores_change_nothing(tmp_path: Path, in_process: dict[str, Displacements]) -> None:
     with BusyCores():
         result = launch(short_scenario(), tmp_path / "bag")
@@ -43,6 +44,7 @@ def test_loaded_cores_change_nothing(tmp_path: Path, in_process: dict[str, Displ
     assert displacements(tmp_path / "bag") == in_process["on_demand"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("mode", "timesteps"), [("on_demand", 4), ("stream", 2)])
 def test_random_delays_in_every_callback_change_nothing(
     tmp_path: Path,

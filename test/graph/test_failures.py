@@ -50,6 +50,10 @@ def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path: Path, 
         killer.started(domain, pids)
 
     result = launch(short_scenario(*LONG), tmp_path / "bag", say=killer.say, on_start=on_start)
+    # At once: the domain is free for other tests now.
+    # Ports 7000 and up are shared by all domains: what another test's process still holds now may be an orphan later.
+    assert shared_memory_ports(domains[0]) == []
+    assert {group for group in find_orphans(domains[0]) if not group.startswith("fastrtps_port70")} == set()
     assert result.exit_code == 4
     assert f"node {node} was killed by SIGKILL" in result.reason
     assert set(killer.pids) == set(NODES)
@@ -59,11 +63,9 @@ def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path: Path, 
     assert len(analysis.followers[0].timesteps) >= 2
     assert analysis.outcome == "incomplete"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bag"]
-    assert shared_memory_ports(domains[0]) == []
-    # Ports 7000 and up are shared by all domains: what another test's process still holds now may be an orphan later.
-    assert {group for group in find_orphans(domains[0]) if not group.startswith("fastrtps_port70")} == set()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("node", ["/follower_1/predictor", "/recorder"])
 def test_a_stopped_node_ends_the_run_by_name_with_a_whole_bag(tmp_path: Path, node: str) -> None:
     killer = Killer(node, signal.SIGSTOP, after_timesteps=2)
@@ -75,6 +77,7 @@ def test_a_stopped_node_ends_the_run_by_name_with_a_whole_bag(tmp_path: Path, no
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bag"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("node", ["/overhead_tracker", "/recorder"])
 def test_a_node_stopped_at_the_end_is_named_and_the_bag_is_whole(tmp_path: Path, node: str) -> None:
     killer = Killer(node, signal.SIGSTOP, after_timesteps=4)
@@ -84,6 +87,7 @@ def test_a_node_stopped_at_the_end_is_named_and_the_bag_is_whole(tmp_path: Path,
     assert len(analyse(load_run(tmp_path / "bag")).followers[0].timesteps) == 4
 
 
+@pytest.mark.long
 def test_a_launcher_that_was_stopped_for_a_while_goes_on(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand", "--json"]
     command += ["--set", "leader.timesteps=4", "--bag", str(tmp_path / "bag")]

@@ -15,7 +15,7 @@ from robot_formation.bag.reader import read_bag
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.launching.processes import Process, processes, progress
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("namespaces")]
+pytestmark = [pytest.mark.graph, pytest.mark.long, pytest.mark.xdist_group("namespaces")]
 
 SITES = {"/site_a": 3, "/deep/site_b": 4}  # namespace and seed
 

@@ -12,7 +12,7 @@ from robot_formation.analysis.quantities import analyse
 from robot_formation.bag.reader import read_bag
 from robot_formation.experiment.in_process import run_in_process
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("trouble_over_the_graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.long, pytest.mark.xdist_group("trouble_over_the_graph")]
 
 GROUND = (
     "world.surface_parameters=[size_m=2.6, curvature_per_m=0.06]",

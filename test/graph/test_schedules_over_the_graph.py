@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from graph_tools import BusyCores, displacements, launch, short_scenario
-from graph_witness import FOLLOWER_NODES, Witness
+from graph_witness import FOLLOWER_NODES, witnessed_run
 from robot_formation import names
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import Scenario
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("schedules_over_the_graph")]
+pytestmark = [pytest.mark.graph, pytest.mark.long, pytest.mark.xdist_group("schedules_over_the_graph")]
 
 GROUND = (
     "world.surface_parameters=[size_m=2.6, curvature_per_m=0.06]",
@@ -55,10 +55,7 @@ def test_a_follower_hears_ticks_of_its_neighbours_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, schedule: str, ticks: set[str]
 ) -> None:
     chosen = scenario(f"schedule={schedule}", "leader.timesteps=2")
-    witness = Witness(chosen.robots, monkeypatch)
-    result = launch(chosen, tmp_path / "bag", on_start=witness.started)
-    witness.finish()
-    assert result.exit_code == 0
+    witness = witnessed_run(chosen, tmp_path, monkeypatch, ticks)
     robot = names.follower(1)
     heard = set().union(*(witness.subscriptions[(f"/{robot}", name)] for name in FOLLOWER_NODES))
     foreign = {topic for topic in heard if not topic.startswith(f"/{robot}/")}

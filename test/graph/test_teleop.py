@@ -14,7 +14,7 @@ from graph_tools import displacements, formation, launch, short_scenario
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.experiment.in_process import run_in_process
 
-pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("teleop")]
+pytestmark = [pytest.mark.graph, pytest.mark.long, pytest.mark.xdist_group("teleop")]
 
 CIRCLE = ("heading_deg=90", "leader.path=circle", "leader.path_parameters=[heading=along, radius_m=0.6]")
 

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import time
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -61,10 +62,10 @@ class Chromium:
         """Return what an expression of JavaScript gives."""
         return self._call("Runtime.evaluate", expression=expression, returnByValue=True)["result"].get("value")
 
-    def until(self, expression: str) -> Any:
-        """Wait until an expression gives something true, and return that."""
+    def until(self, expression: str, unless: Callable[[], bool] = lambda: False) -> Any:
+        """Wait until an expression gives something true, or until there is no more to wait for; return what it gave."""
         end = time.monotonic() + DEADLINE_S
-        while not (found := self.value(expression)):
+        while not (found := self.value(expression)) and not unless():
             assert time.monotonic() < end, f"{expression} did not come true; the page says: {self.value(_TEXT)}"
             time.sleep(0.1)
         return found

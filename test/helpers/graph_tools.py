@@ -79,19 +79,6 @@ def json_of(completed: subprocess.CompletedProcess[str]) -> Any:
     return json.loads(completed.stdout)
 
 
-def node_processes() -> set[int]:
-    """Process ids of all node processes of this project on the machine."""
-    found = set()
-    for entry in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            command = entry.read_bytes()
-            if b"robot_formation.nodes\0" in command or command.startswith(b"robot_formation "):
-                found.add(int(entry.parent.name))
-        except OSError:
-            continue
-    return found
-
-
 def alive(pid: int) -> bool:
     """Whether a process runs (a zombie does not)."""
     try:

@@ -68,7 +68,7 @@ def _import_own(executable: str) -> None:
         for name in (*_OF_VERBS, *(f"robot_formation.nodes.{node}.{node}_node" for node in ("recorder", "player"))):
             importlib.import_module(name)
     elif executable in KINDS:
-        KINDS[executable].classes()
+        KINDS[executable].component_class()
     else:
         importlib.import_module(f"robot_formation.nodes.{executable}.{executable}_node")
 

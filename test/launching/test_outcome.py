@@ -70,3 +70,11 @@ def test_a_follower_that_held_still_makes_a_lost_run_of_one_that_the_leader_ende
     assert run.exit_code == 3
     assert run.failed
     assert str(run) == "outcome: lost (/follower_1/fine_tuner ended with exit code 3), bag my_bag"
+
+
+def test_a_node_started_elsewhere_that_is_missing_ends_the_run() -> None:
+    run, firsts = ended(("progress", 4), ("leader", 0), ("world", 0))
+    assert firsts == [True, False, False]
+    assert run.failed
+    missing = "a node that was to be started elsewhere is missing or gone: progress has said which"
+    assert str(run) == f"outcome: incomplete ({missing}), bag my_bag"

@@ -1,6 +1,8 @@
 """Our launcher and launch/formation.launch.py start the same nodes with the same parameters."""
 
 import importlib.util
+import json
+import re
 import sys
 import types
 from collections.abc import Mapping
@@ -280,3 +282,36 @@ def test_a_formation_in_a_namespace_lies_there_as_a_whole(tmp_path: Path) -> Non
     assert placed == [f"/site_a{process.name}" for process in processes(scenario, tmp_path / "bag")]
     assert "/site_a/follower_1/drive" in placed
     assert "/site_a/recorder" in placed
+
+
+def test_nodes_that_are_left_out_are_not_started_and_the_others_wait_for_them(
+    launch_file: ModuleType, tmp_path: Path
+) -> None:
+    options = {"without": "block_detector, follower_1/predictor", "stand_in_timeout": "20", "set": "followers=2"}
+    nodes = started(launch_file, None, track="one", bag=str(tmp_path / "bag"), **options)
+    names = [f"{node['namespace']}/{node['executable']}".strip("/") for node in nodes]
+    assert "follower_2/predictor" in names
+    left_out = ["follower_1/block_detector", "follower_2/block_detector", "follower_1/predictor"]
+    assert not set(names) & set(left_out)
+    parameters = {name: node["parameters"][0] for name, node in zip(names, nodes, strict=True)}
+    waiting = {name: found.get("wait_for_nodes") for name, found in parameters.items() if name not in names[-1:]}
+    assert waiting == {name: left_out for name in waiting if name != "recorder"} | {"recorder": None}
+    assert (parameters["progress"]["stand_ins"], parameters["progress"]["stand_in_timeout_s"]) == (left_out, 20.0)
+    (said,) = [text for text in parameters["recorder"]["metadata"] if text.startswith("stand_ins=")]
+    assert json.loads(said.partition("=")[2]) == left_out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"without": "block_detektor"}, "without:=: this run has no node 'block_detektor' to leave out; did you mean"),
+        ({"without": "leader"}, "without:= can't leave out the leader"),
+        ({"stand_in_timeout": "soon"}, "stand_in_timeout:= can't be 'soon'"),
+        ({"stand_in_timeout": "nan"}, "stand_in_timeout:= can't be 'nan'"),
+    ],
+)
+def test_what_cannot_be_left_out_is_told_before_anything_is_started(
+    launch_file: ModuleType, arguments: dict[str, str], says: str
+) -> None:
+    with pytest.raises(FormationError, match=re.escape(says)):
+        started(launch_file, None, **arguments)

@@ -11,7 +11,6 @@ import pytest
 
 from cli_tools import complaint
 from robot_formation.cli.main import main
-from robot_formation.network import shared_memory_space
 from robot_formation.network.shared_memory_space import SharedMemoryError, require_space
 
 
@@ -45,7 +44,7 @@ def full(folder: object = None, statvfs: object = None) -> None:
 def test_verbs_that_load_ros_say_it_in_one_line(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: tuple[str, str]
 ) -> None:
-    monkeypatch.setattr(shared_memory_space, "require_space", full)
+    monkeypatch.setattr("robot_formation.network.loading_ros.require_space", full)
     assert "/dev/shm is full" in complaint(capsys, *arguments)
 
 
@@ -60,7 +59,6 @@ def test_the_doctor_names_it_and_does_not_load_ros(
 @pytest.mark.parametrize(
     ("command", "code"),
     [
-        (["-m", "robot_formation.cli", "list"], 2),
         (["-m", "robot_formation.cli", "run", "--in-process"], 2),
         (["-m", "robot_formation.nodes", "leader"], 2),
     ],

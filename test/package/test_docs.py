@@ -1,13 +1,12 @@
 """README and docs agree with the code: topics, parameters, graph, verbs, links."""
 
-import importlib.util
 import re
 from dataclasses import fields, replace
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
+import make_parameter_tables
 from repository import PACKAGE, ROOT
 from robot_formation import names
 from robot_formation.cli.verbs import VERBS
@@ -38,18 +37,6 @@ BOXES = {
     "leader_drive": ("drive", "leader"),
     **{kind: (kind, "follower_1") for kind in ("drive", "block_detector", "fine_tuner", "predictor")},
 }
-
-
-def make_tables() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_tables", ROOT / "docs" / "make_parameter_tables.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-TABLES = make_tables()
 
 
 def component(kind: str, robot: str) -> Component:
@@ -134,13 +121,13 @@ def test_topics_of_poses_pictures_and_blocks_name_their_frame(kind: str) -> None
 
 @pytest.mark.parametrize("name", [*NODES, "common"])
 def test_a_pages_parameter_table_is_up_to_date(name: str) -> None:
-    before, after = TABLES.updated(name, TABLES.parameter_classes()[name])
+    before, after = make_parameter_tables.updated(name, make_parameter_tables.parameter_classes()[name])
     assert before == after, "run python docs/make_parameter_tables.py"
 
 
 @pytest.mark.parametrize("name", NODES)
 def test_every_parameter_of_a_node_is_on_its_page(name: str) -> None:
-    parameters = TABLES.parameter_classes()[name]
+    parameters = make_parameter_tables.parameter_classes()[name]
     page = (NODE_PAGES / f"{name}.md").read_text()
     assert [parameter for parameter in specs(parameters) if f"\n| `{parameter}` |" not in page] == []
 

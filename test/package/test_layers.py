@@ -12,7 +12,7 @@ from repository import PACKAGE
 
 # From the bottom to the top, in a strict order: a part imports those before it only.
 LAYERS = [
-    ("errors", "exit_codes", "json_values", "names", "parameters", "paths", "plugins", ""),
+    ("errors", "exit_codes", "extras", "json_values", "names", "parameters", "paths", "plugins", ""),
     *(
         (room,)
         for room in (
@@ -31,7 +31,10 @@ LAYERS = [
     *((room,) for room in ("drive", "leader", "alignment", "follower", "analysis")),
     *((room,) for room in ("conversions", "components")),
     ("testing",),
-    *((room,) for room in ("viewing", "calibration", "experiment", "reporting", "nodes", "launching", "paper", "cli")),
+    *(
+        (room,)
+        for room in ("viewing", "calibration", "experiment", "reporting", "nodes", "launching", "paper", "api", "cli")
+    ),
 ]
 LEVEL = {area: level for level, areas in enumerate(LAYERS) for area in areas}
 ROS = re.compile(
@@ -86,7 +89,8 @@ def imports(file: Path, *, for_types: bool = True) -> Iterator[str]:
                 yield inner if module.startswith("robot_formation") and exists(inner) else module
 
 
-GRAPH = {name_of(file): set(imports(file)) for file in FILES}
+# What the package itself names for type checkers only, it imports when it is asked for it: names of "api", at the top.
+GRAPH = {name_of(file): set(imports(file, for_types=name_of(file) != PACKAGE.name)) for file in FILES}
 OWN = {module: {name for name in found if name.split(".")[0] == "robot_formation"} for module, found in GRAPH.items()}
 
 

@@ -1,4 +1,4 @@
-"""What package.xml, setup.py and the tree say about each other."""
+"""What package.xml, pyproject.toml, setup.py and the tree say about each other."""
 
 import configparser
 import importlib
@@ -15,9 +15,9 @@ from typing import Any
 from xml.etree.ElementTree import Element
 
 import pytest
-import setuptools
 
 import robot_formation
+from project_table import installed_files, project, setup_arguments
 from repository import ROOT
 from robot_formation import paths
 from robot_formation.components.catalogue import KINDS
@@ -30,37 +30,21 @@ def package_xml() -> Element:
     return ElementTree.parse(ROOT / "package.xml").getroot()
 
 
-@pytest.fixture(scope="module")
-def setup_arguments() -> dict[str, Any]:
-    """The keyword arguments that setup.py hands to setuptools."""
-    found = {}
-    before, old = setuptools.setup, Path.cwd()
-    setuptools.setup = lambda **arguments: found.update(arguments)
-    os.chdir(ROOT)
-    try:
-        exec(compile((ROOT / "setup.py").read_text(), "setup.py", "exec"), {"__name__": "__main__"})
-    finally:
-        setuptools.setup = before
-        os.chdir(old)
-    return found
-
-
-def test_the_version_is_the_same_everywhere(package_xml: Element, setup_arguments: dict[str, Any]) -> None:
+def test_the_version_is_the_same_everywhere(package_xml: Element) -> None:
     (cited,) = re.findall(r"^version: (\S+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
-    versions = {package_xml.findtext("version"), setup_arguments["version"], robot_formation.__version__, cited}
+    (printed,) = re.findall(r"^  version = \{(\S+)\},$", (ROOT / "README.md").read_text(), re.MULTILINE)
+    versions = {package_xml.findtext("version"), project()["version"], robot_formation.__version__, cited, printed}
     assert len(versions) == 1
 
 
-def test_package_xml_is_an_ament_python_package_of_format_3(
-    package_xml: Element, setup_arguments: dict[str, Any]
-) -> None:
+def test_package_xml_is_an_ament_python_package_of_format_3(package_xml: Element) -> None:
     assert package_xml.get("format") == "3"
-    assert package_xml.findtext("name") == setup_arguments["name"] == "robot_formation"
-    assert package_xml.findtext("license") == setup_arguments["license"] == "Apache-2.0"
+    assert package_xml.findtext("name") == project()["name"] == "robot_formation"
+    assert package_xml.findtext("license") == setup_arguments()["license"] == "Apache-2.0"
     assert package_xml.findtext("export/build_type") == "ament_python"
     maintainer = package_xml.find("maintainer")
     assert maintainer is not None
-    assert maintainer.get("email")
+    assert {"name": maintainer.text, **maintainer.attrib} == project()["authors"][0]
 
 
 def test_package_xml_names_each_dependency_once_by_a_rosdep_like_key(package_xml: Element) -> None:
@@ -87,60 +71,99 @@ def test_package_xml_names_every_ros_package_that_is_imported(package_xml: Eleme
     assert imported <= keys
 
 
-def test_every_requirement_has_a_rosdep_key_that_brings_it(
-    package_xml: Element, setup_arguments: dict[str, Any]
-) -> None:
+def requirements(*extras: str) -> list[str]:
+    """What the package needs, and what some of its extras bring."""
+    return [
+        *project()["dependencies"],
+        *(name for extra in extras for name in project()["optional-dependencies"][extra]),
+    ]
+
+
+def test_every_requirement_has_a_rosdep_key_that_brings_it(package_xml: Element) -> None:
     brings = {
         "mcap-ros2-support": {"mcap", "lz4", "zstandard"},
         "python3-opencv": {"opencv-python-headless"},
         "python3-pil": {"pillow"},
         "python3-yaml": {"PyYAML"},
-        **{f"python3-{name}": {name} for name in ("joblib", "matplotlib", "numpy", "scipy", "setproctitle")},
+        **{
+            f"python3-{name}": {name}
+            for name in ("argcomplete", "joblib", "matplotlib", "numpy", "scipy", "setproctitle")
+        },
         **{f"python3-{name}-pip": {name} for name in ("pybullet", "rosbags")},
     }
     keys = {element.text or "" for element in package_xml.iter("exec_depend")}
-    required = {requirement.partition(">=")[0] for requirement in setup_arguments["install_requires"]}
+    required = {requirement.partition(">=")[0] for requirement in requirements("sim")}
     assert set().union(*(brings.get(key, set()) for key in keys)) == required
 
 
-def test_no_requirement_has_an_upper_cap(setup_arguments: dict[str, Any]) -> None:
-    requirements = list(setup_arguments["install_requires"])
-    for extra in setup_arguments["extras_require"].values():
-        requirements += extra
-    assert not [requirement for requirement in requirements if re.search(r"<|==|~=", requirement)]
+def test_no_requirement_has_an_upper_cap() -> None:
+    assert not [text for text in requirements(*project()["optional-dependencies"]) if re.search(r"<|==|~=", text)]
 
 
-def test_the_lowest_versions_that_are_tested_are_the_lower_bounds(setup_arguments: dict[str, Any]) -> None:
-    requirements = [*setup_arguments["install_requires"], *setup_arguments["extras_require"]["test"]]
-    bounds = dict(requirement.split(">=") for requirement in requirements if ">=" in requirement)
+def test_the_lowest_versions_that_are_tested_are_the_lower_bounds() -> None:
+    bounds = dict(text.split(">=") for text in requirements("sim", "test") if ">=" in text)
     lines = (ROOT / ".ci" / "lowest.txt").read_text().partition("# Not ours")[0].splitlines()
     assert dict(line.split("==") for line in lines if not line.startswith("#")) == bounds
-    assert [requirement for requirement in setup_arguments["install_requires"] if ">=" not in requirement] == []
+    assert [text for text in requirements("sim") if ">=" not in text] == []
 
 
-def test_each_executable_starts_a_function_that_exists(setup_arguments: dict[str, Any]) -> None:
-    for script in setup_arguments["entry_points"]["console_scripts"]:
-        module, function = script.split(" = ")[1].split(":")
-        assert callable(getattr(importlib.import_module(module), function)), script
+def test_the_base_needs_neither_simulation_nor_ros_and_pip_brings_both() -> None:
+    extras = project()["optional-dependencies"]
+    assert not [text for text in requirements() if re.match("pybullet|ros-|viser|dask", text)]
+    assert extras["pip"] == ["robot_formation[sim,ros]"]
+    assert extras["all"] == ["robot_formation[sim,ros,view,dask]"]
+    assert set(re.findall(r"'\.\[(.+?)\]'", (ROOT / "formation").read_text())) == {"pip,test,view"}
 
 
-def test_each_node_is_an_executable_of_its_name(setup_arguments: dict[str, Any]) -> None:
-    scripts = setup_arguments["entry_points"]["console_scripts"]
-    nodes = [*KINDS, "recorder", "player", "progress", "viewer"]
-    assert sorted(NAMES) == sorted(nodes)
-    assert {f"{node} = robot_formation.nodes.executables:{node}" for node in nodes} == set(scripts) - {
-        "formation = robot_formation.cli.__main__:main"
-    }
+def test_each_executable_starts_a_function_that_exists() -> None:
+    for target in project()["scripts"].values():
+        module, function = target.split(":")
+        assert callable(getattr(importlib.import_module(module), function)), target
 
 
-def test_no_executable_loads_ros_before_it_takes_signals(setup_arguments: dict[str, Any]) -> None:
-    targets = [script.split(" = ")[1].split(":")[0] for script in setup_arguments["entry_points"]["console_scripts"]]
+def test_each_node_is_a_command_with_a_prefix_and_an_executable_by_its_short_name() -> None:
+    nodes = {*KINDS, "recorder", "player", "progress", "viewer"}
+    assert set(NAMES) == nodes
+    commands = {f"formation-{node.replace('_', '-')}": f"robot_formation.nodes.executables:{node}" for node in nodes}
+    assert project()["scripts"] == {"formation": "robot_formation.cli.__main__:main", **commands}
+    executables = {place for place in installed_files() if place.startswith("lib/")}
+    assert executables == {f"lib/robot_formation/{name}" for name in {*nodes, "formation"}}
+
+
+def test_executables_by_short_names_can_be_started_by_any_python_that_is_active() -> None:
+    for path in (ROOT / "ros2_run").iterdir():
+        assert os.access(path, os.X_OK), path
+        assert path.read_text().startswith("#!/usr/bin/env python3\n"), path
+    config = configparser.ConfigParser()
+    config.read(ROOT / "setup.cfg")
+    assert config["build_scripts"]["executable"] == "/usr/bin/env python3"
+
+
+def test_no_file_is_a_link_which_archives_and_some_systems_lose() -> None:
+    listed = subprocess.run(["git", "ls-files", "--stage"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert not [line for line in listed.stdout.splitlines() if line.startswith("120000")]
+
+
+def test_an_executable_is_the_node_that_its_file_is_named_after() -> None:
+    for path in (ROOT / "ros2_run").iterdir():
+        if path.name != "formation":
+            assert f"from robot_formation.nodes.executables import {path.name}\n" in path.read_text()
+            assert path.read_text().endswith(f"sys.exit({path.name}())\n")
+    command = [sys.executable, str(ROOT / "ros2_run" / "fine_tuner"), "--help"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "fine_tuner" in done.stdout + done.stderr
+
+
+def test_no_executable_loads_ros_before_it_takes_signals() -> None:
+    targets = {target.split(":")[0] for target in project()["scripts"].values()}
     code = f"import sys, {', '.join(targets)}; sys.exit('rclpy' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
-def test_every_file_of_config_and_launch_is_installed_to_its_place(setup_arguments: dict[str, Any]) -> None:
-    installed = {f"{place}/{Path(file).name}": file for place, files in setup_arguments["data_files"] for file in files}
+def test_every_file_of_config_and_launch_is_installed_to_its_place() -> None:
+    installed = installed_files()
     for folder in ("config", "launch"):
         files = [path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix != ".pyc"]
         for path in files:
@@ -148,21 +171,19 @@ def test_every_file_of_config_and_launch_is_installed_to_its_place(setup_argumen
             assert installed[f"share/robot_formation/{inside}"] == inside
 
 
-def test_every_package_folder_is_installed(setup_arguments: dict[str, Any]) -> None:
-    folders = {path.parent.relative_to(ROOT) for path in (ROOT / "robot_formation").rglob("*.py")}
-    assert {".".join(folder.parts) for folder in folders} == set(setup_arguments["packages"])
+def test_what_the_package_is_named_by_is_there_when_colcon_builds_with_links() -> None:
+    assert {"pyproject.toml", project()["readme"]} <= set(installed_files().values())
 
 
-def test_the_resource_marker_has_the_packages_name(setup_arguments: dict[str, Any]) -> None:
-    place = "share/ament_index/resource_index/packages"
-    assert (place, ["resource/robot_formation"]) in setup_arguments["data_files"]
+def test_every_folder_of_code_is_a_package() -> None:
+    folders = {path.parent for path in (ROOT / "robot_formation").rglob("*.py")}
+    assert not [folder for folder in folders if not (folder / "__init__.py").is_file()]
+
+
+def test_the_resource_marker_has_the_packages_name() -> None:
+    place = "share/ament_index/resource_index/packages/robot_formation"
+    assert installed_files()[place] == "resource/robot_formation"
     assert (ROOT / "resource" / "robot_formation").is_file()
-
-
-def test_executables_go_where_ros2_run_looks() -> None:
-    config = configparser.ConfigParser()
-    config.read(ROOT / "setup.cfg")
-    assert config["develop"]["script_dir"] == config["install"]["install_scripts"] == "$base/lib/robot_formation"
 
 
 def differences(one: dict[str, Any], other: dict[str, Any], tolerance: float) -> list[str]:
@@ -217,7 +238,7 @@ def test_relative_paths_of_the_installation_are_those_of_the_users_folder(tmp_pa
     binaries = user / "environment" / "bin"
     checkout.mkdir()
     binaries.mkdir(parents=True)
-    for name in ("formation", "setup.py", "setup.cfg"):
+    for name in ("formation", "setup.py", "pyproject.toml"):
         shutil.copy(ROOT / name, checkout / name)
     (user / "constraints.txt").write_text("")
     (binaries / "python").write_text(PYTHON)

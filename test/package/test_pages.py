@@ -90,7 +90,7 @@ def test_the_index_lists_every_page_once() -> None:
 
 def test_every_page_belongs_to_one_of_four_kinds() -> None:
     kinds = {page.relative_to(ROOT / "docs").parts[0] for page in (ROOT / "docs").rglob("*.md")}
-    assert kinds == {"README.md", "tutorial", "how-to", "reference", "explanation"}
+    assert kinds == {"README.md", "index.md", "tutorial", "how-to", "reference", "explanation"}
 
 
 def test_the_readme_is_short() -> None:

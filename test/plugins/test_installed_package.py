@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from examples import install_example
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "own_classes"
@@ -19,12 +20,7 @@ SHORT = ("--set", "leader.timesteps=4", "--camera", "on_demand")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Variables with which the example and a broken package are installed."""
     folder = tmp_path_factory.mktemp("installed")
-    source = tmp_path_factory.mktemp("source")
-    for file in EXAMPLE.iterdir():
-        if file.is_file():
-            (source / file.name).write_bytes(file.read_bytes())
-    options = ("--quiet", "--no-deps", "--no-build-isolation", "--disable-pip-version-check", "--target", str(folder))
-    subprocess.run([sys.executable, "-m", "pip", "install", *options, str(source)], check=True, timeout=300)
+    install_example("own_classes", folder, tmp_path_factory.mktemp("source"))
     broken = folder / "broken-1.0.dist-info"
     broken.mkdir()
     (broken / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")

@@ -1,5 +1,6 @@
 """Classes from outside the package, by 'module:Class': what they need, what they may leave out, what is wrong."""
 
+import importlib
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -34,7 +35,6 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setattr(sys, "path", [entry for entry in sys.path if entry])
     yield tmp_path / "mine.py"
     sys.modules.pop("mine", None)
-    plugins.load.cache_clear()
 
 
 class Least:
@@ -371,3 +371,36 @@ def test_a_value_that_a_path_itself_refuses_is_told(text: str, says: str, monkey
     assert make_path(name).motion(1) == Motion(0.05)
     with pytest.raises(ParameterError, match=says):
         make_path(name, [text])
+
+
+def test_a_class_of_a_notebook_that_is_defined_anew_is_the_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    notebook = sys.modules["__main__"]
+    for height_m in (0.1, 0.2):
+
+        class Terrace:
+            level_m = height_m
+
+            def height(self, x: float, y: float) -> float:
+                return self.level_m
+
+        monkeypatch.setattr(notebook, "Terrace", Terrace, raising=False)
+        assert make_surface("__main__:Terrace").height(0.0, 0.0) == height_m
+    for kind in (Least, Ahead):
+        monkeypatch.setattr(notebook, "Mine", kind, raising=False)
+        assert plugins.load("predictor", "__main__:Mine") is kind
+
+
+def test_a_class_of_a_module_that_is_loaded_again_is_the_new_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    file = tmp_path / "loaded_again.py"
+    file.write_text("class Mine:\n    number = 1\n")
+    assert vars(plugins.load("predictor", "loaded_again:Mine"))["number"] == 1
+    file.write_text("class Mine:\n    number = 22\n")
+    importlib.reload(sys.modules["loaded_again"])
+    try:
+        assert vars(plugins.load("predictor", "loaded_again:Mine"))["number"] == 22
+    finally:
+        del sys.modules["loaded_again"]

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from robot_formation.cli.main import main
-from robot_formation.experiment import sweep
-from robot_formation.experiment.sweep import FailedRunsError, Row, Task
+from robot_formation.experiment import sweep_runs
+from robot_formation.experiment.sweep import Row, Task
+from robot_formation.experiment.sweep_runs import FailedRunsError
 from robot_formation.plugins import PluginError
 
 TASKS = [Task("two", "plane", name, seed) for seed in (0, 1, 2) for name in ("previous", "mine:Bad", "mine:Worse")]
@@ -23,7 +24,7 @@ def run_task(task: Task, settings: Sequence[str]) -> Row:
 
 @pytest.fixture
 def made_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep, "run_task", run_task)
+    monkeypatch.setattr(sweep_runs, "run_task", run_task)
 
 
 @pytest.fixture(scope="module")
@@ -49,11 +50,11 @@ def check(rows: Iterator[Row]) -> None:
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_the_others_are_done_on_this_machine(made_up: None, jobs: int) -> None:
-    check(sweep.carry_out(TASKS, (), jobs))
+    check(sweep_runs.carry_out(TASKS, (), jobs))
 
 
 def test_the_others_are_done_on_a_dask_cluster(made_up: None, cluster: str) -> None:
-    check(sweep.carry_out_by_dask(TASKS, (), cluster))
+    check(sweep_runs.carry_out_by_dask(TASKS, (), cluster))
 
 
 FAILING = """

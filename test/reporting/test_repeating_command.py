@@ -40,6 +40,13 @@ def test_the_command_makes_the_same_scenario(track: str, settings: list[str]) ->
     assert repeated(found.command).setup == run.setup
 
 
+def test_the_command_leaves_the_same_nodes_to_others() -> None:
+    left_out = ["follower_1/block_detector", "leader/leader"]
+    found = repetition(run_metadata(load_track("one"), left_out))
+    assert found is not None
+    assert make_parser().parse_args(shlex.split(found.command)[1:]).without == left_out
+
+
 @pytest.mark.parametrize("preset", list(presets()))
 def test_the_command_makes_each_preset_again_with_blackouts_and_pushes(preset: str) -> None:
     run = load(presets()[preset])

@@ -1,0 +1,1 @@
+"""A detector node and a predictor for robot_formation, in a package of their own."""
