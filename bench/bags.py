@@ -16,12 +16,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
+from comparison import Comparison, add_comparisons, as_json
 from robot_formation import conversions
 from robot_formation.bag.definitions import definition
 from robot_formation.bag.qos import TopicQos
@@ -205,12 +206,28 @@ def row(name: str, found: dict[str, float]) -> None:
     )
 
 
+def comparisons(results: Mapping[str, Mapping[str, float]]) -> Iterator[Comparison]:
+    """Yield the recorder's processor time beside the plain writer's, and what was recorded beside what was sent."""
+    for name, found in results.items():
+        if "sent" not in found:
+            continue
+        peer = results[f"mcap writer in process: {name.partition(': ')[2]}"]
+        used, beside = found["cpu_us_per_message"], peer["cpu_us_per_message"]
+        yield Comparison(
+            f"{name}: processor time per message", used, beside, "us", "mcap's writer without a middleware"
+        )
+        yield Comparison(
+            f"{name}: recorded", found["recorded"], found["sent"], "messages", "sent", larger_is_better=True
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=5.0, help="of publishing per case")
     parser.add_argument("--small-rates", type=float, nargs="+", default=[2000.0, 8000.0, 16000.0], help="messages/s")
     parser.add_argument("--image-rates", type=float, nargs="+", default=[60.0, 300.0, 600.0], help="pictures/s")
     parser.add_argument("--json", action="store_true")
+    add_comparisons(parser)
     args = parser.parse_args()
     results: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as name, DomainReservation() as domain:
@@ -231,6 +248,9 @@ def main() -> None:
             "alone": play(folder, environment, 10.0, recorded=False),
             "with a recorder": play(folder, environment, 10.0, recorded=True),
         }
+    if args.comparisons:
+        print(as_json(comparisons(results)))
+        return
     if args.json:
         print(json.dumps({**results, "play": played}, indent=2))
         return

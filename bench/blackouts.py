@@ -14,24 +14,23 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-import leader_paths
-from leader_paths import PATHS, SURFACES, Task, print_table
+import leader_path_runs
+from leader_path_runs import PATHS, SURFACES, Task
+from leader_path_tables import BASELINE, OWN, cell, print_table
+from robot_formation.analysis.markdown import table
 from robot_formation.analysis.quantities import FollowerAnalysis, analyse
 from robot_formation.batch.pool import run_parallel
 from robot_formation.batch.progress_line import with_progress
 from robot_formation.cli.sweep import seeds
-from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_memory_record import run_in_memory
-from run_table import missing, open_table
+from run_table import add_settings, missing, open_table, study_command
 
 BLACKOUTS = {1: 18, 2: 23, 3: 30, 5: 38}
 """First blind timestep by length."""
@@ -75,7 +74,7 @@ def build(task: Task, settings: Sequence[str]) -> scenarios.Scenario:
     """
     blackouts = ", ".join(f"[{first}, {length}]" for length, first in BLACKOUTS.items())
     own = (f"leader.timesteps={TIMESTEPS}", f"blackouts=[{blackouts}]", "fine_tuner.mode=precise")
-    return leader_paths.build(task, [*own, *settings])
+    return leader_path_runs.build(task, [*own, *settings])
 
 
 def run_task(task: Task, settings: Sequence[str]) -> Row:
@@ -114,12 +113,12 @@ def carry_out(args: argparse.Namespace) -> int:
         for path in args.paths
         for predictor in args.predictors
     ]
-    table, tasks = missing(args.out, Row, chosen)
+    stored, tasks = missing(args.out, Row, chosen)
     for task in {(task.path, task.seed): task for task in tasks}.values():
         build(task, args.set).check()
     rows = run_parallel(run_task, ((task, args.set) for task in tasks), args.jobs)
     for row in with_progress(rows, len(tasks)):
-        table.append([row])
+        stored.append([row])
     return 0
 
 
@@ -151,31 +150,51 @@ def report(args: argparse.Namespace) -> int:
     return 0
 
 
+def page_lines(rows: Sequence[Row]) -> list[str]:
+    """Return the page's table: the baseline's median errors / those of `formation`, by path."""
+    groups: dict[str, dict[str, dict[int, Row]]] = {}
+    for row in rows:
+        groups.setdefault(row.path, {}).setdefault(row.predictor, {})[row.seed] = row
+    names = [*(f"error_{length}_m" for length in BLACKOUTS), "growth_3_m"]
+    lines = []
+    for path, found in groups.items():
+        base, own = found.get(BASELINE, {}), found.get(OWN, {})
+        medians = [
+            " / ".join(median_cm([getattr(row, name) for row in runs.values()]) for runs in (base, own))
+            for name in names
+        ]
+        paired = [
+            ratio(own[seed].growth_3_m, base[seed].growth_3_m)
+            for seed in own.keys() & base.keys()
+            if own[seed].growth_3_m is not None or base[seed].growth_3_m is not None
+        ]
+        again = " / ".join(str(sum(row.found_again_3 or 0 for row in runs.values())) for runs in (base, own))
+        lines.append([path, str(len(own)), *medians, cell(paired, 1.0, 2), again])
+    head = ["path", "runs", *map(str, BLACKOUTS), "growth over 3", "ratio of the growths", "in place again"]
+    return table(head, lines)
+
+
+def ratio(own: float | None, base: float | None) -> float:
+    """Return the ratio of two lengths; a missing one, of a run that was lost before, is infinite."""
+    if own is None:
+        return math.inf
+    return own / base if base else 0.0 if base is None else math.inf
+
+
 def median_cm(values: Sequence[float | None]) -> str:
     """Median in centimetres; a missing value, of a run that was lost before, is infinite."""
     return f"{100.0 * float(np.median([math.inf if value is None else value for value in values])):.1f}"
 
 
+def add_options(run: argparse.ArgumentParser) -> None:
+    """Add what only this bench takes."""
+    run.add_argument("--surface", default="bowl", choices=list(SURFACES))
+    add_settings(run)
+
+
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    verbs = parser.add_subparsers(dest="verb", required=True)
-    for name, function in (("run", carry_out), ("report", report)):
-        verb = verbs.add_parser(name, help=function.__doc__)
-        verb.add_argument("out", type=Path, help="folder of the table")
-        verb.set_defaults(function=function)
-        if name == "run":
-            verb.add_argument("--seeds", default="0:10")
-            verb.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-            verb.add_argument("--surface", default="bowl", choices=list(SURFACES))
-            verb.add_argument("--paths", type=lambda text: text.split(","), default=list(PATHS_HERE))
-            verb.add_argument("--predictors", type=lambda text: text.split(","), default=list(PREDICTORS))
-            verb.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
-    args = parser.parse_args()
-    try:
-        return int(args.function(args))
-    except FormationError as error:
-        print(error, file=sys.stderr)
-        return 2
+    choices = {"paths": PATHS_HERE, "predictors": PREDICTORS}
+    return study_command(__doc__, {"run": carry_out, "report": report}, "0:10", choices, add_options)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from cv2.typing import MatLike
 
+from comparison import Comparison, add_comparisons, as_json
 from fastest import fastest_ms
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.pixy2.color_table import ColorTable
@@ -118,22 +119,30 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15, help="interleaved rounds per scene (default: 15)")
     parser.add_argument("--threads", type=int, help="threads of OpenCV (default: its own choice)")
+    add_comparisons(parser)
     args = parser.parse_args()
     if args.threads is not None:
         cv2.setNumThreads(args.threads)
     examples = json.loads((DATA / "examples.json").read_text(encoding="utf-8"))
     parameters = from_mapping(DetectorParameters, examples["parameters"]["paper"], where="paper")
-    print(f"OpenCV {cv2.__version__} with {cv2.getNumThreads()} threads")
-    print(f"{'scene':16} {'blocks':>6} {'detector ms':>12} {'with tracking':>14} {'usual ms':>9} {'ratio':>6}")
-    ratios = []
+    if not args.comparisons:
+        print(f"OpenCV {cv2.__version__} with {cv2.getNumThreads()} threads")
+        print(f"{'scene':16} {'blocks':>6} {'detector ms':>12} {'with tracking':>14} {'usual ms':>9} {'ratio':>6}")
+    ratios, found = [], []
     for scene, (_, group) in SCENES.items():
         signatures = [Signature.from_mapping(s, where=group) for s in examples["groups"][group]["signatures"]]
         detector = BlockDetector(signatures, parameters)
         image = scene_picture(scene)
         mine, tracked, usual = measure(detector, image, hsv_ranges(signatures), max(1, args.rounds))
         ratios.append(usual / mine)
-        found = len(detector.detect(image))
-        print(f"{scene:16} {found:6} {mine:12.3f} {tracked:14.3f} {usual:9.3f} {ratios[-1]:6.1f}")
+        found.append(Comparison(f"picture: {scene}", mine, usual, "ms", "the usual OpenCV pipeline"))
+        if args.comparisons:
+            continue
+        blocks = len(detector.detect(image))
+        print(f"{scene:16} {blocks:6} {mine:12.3f} {tracked:14.3f} {usual:9.3f} {ratios[-1]:6.1f}")
+    if args.comparisons:
+        print(as_json(found))
+        return 0
     print(f"median ratio {statistics.median(ratios):.1f}, smallest {min(ratios):.1f}")
     table = fastest_ms(lambda: ColorTable.of(signatures, parameters), CALLS)
     print(f"colour table, once per change: {table:.1f} ms")

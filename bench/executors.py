@@ -17,6 +17,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import UInt32
 
+from comparison import Comparison, add_comparisons, as_json
 from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.nodes.host.executor import make_executor
 
@@ -53,11 +54,15 @@ def microseconds_per_callback(make: Callable[..., Executor], domain: int, messag
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--messages", type=int, default=5000)
+    add_comparisons(parser)
     args = parser.parse_args()
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     with DomainReservation() as domain:
         stock = microseconds_per_callback(SingleThreadedExecutor, domain, args.messages)
         ours = microseconds_per_callback(make_executor, domain, args.messages)
+    if args.comparisons:
+        print(as_json([Comparison("callback", ours, stock, "us", "rclpy's SingleThreadedExecutor")]))
+        return
     print(f"SingleThreadedExecutor {stock:.1f} us, ours {ours:.1f} us per callback: {stock / ours:.1f} times faster")
 
 

@@ -12,6 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from comparison import Comparison, add_comparisons, as_json
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.launching.processes import run_metadata
@@ -34,10 +35,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--timesteps", default="100,200,400", help="numbers of timesteps, separated by commas")
     parser.add_argument("--json", action="store_true", help="print JSON")
+    add_comparisons(parser)
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         sizes = {number: bag_mb(number, Path(folder)) for number in map(int, args.timesteps.split(","))}
-    if args.json:
+    if args.comparisons:
+        most = max(sizes)
+        print(as_json([Comparison(f"bag of {most} timesteps", sizes[most], AIM_MB * most / AIM_TIMESTEPS, "MB")]))
+    elif args.json:
         print(json.dumps({number: {"mb": mb, "mb_per_timestep": mb / number} for number, mb in sizes.items()}))
     else:
         print("| timesteps | bag (MB) | per timestep (MB) |\n|---|---|---|")

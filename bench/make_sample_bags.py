@@ -9,7 +9,6 @@ Run: python bench/make_sample_bags.py [--out FOLDER] [--only NAME ...] [--check]
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import shutil
 import sys
@@ -21,7 +20,6 @@ from typing import Any
 
 from robot_formation.analysis.from_bag import load_run
 from robot_formation.analysis.quantities import analyse
-from robot_formation.analysis.report import to_json
 from robot_formation.errors import FormationError
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_process import run_in_process
@@ -97,7 +95,7 @@ def changes(sample: Sample, folder: Path) -> list[str]:
 
 def analysis_of(bag: Path) -> Any:
     """Analyse a bag: what `formation analyze --json` prints."""
-    return json.loads(to_json(analyse(load_run(bag))))
+    return analyse(load_run(bag)).to_json()
 
 
 def differences(one: Any, other: Any, where: str = "") -> Iterator[str]:

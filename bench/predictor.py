@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from odmd import OnlineDMD
 
+from comparison import Comparison, add_comparisons, as_json
 from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.koopman.predictors import NAMES, Predictor, PredictorParameters
 from robot_formation.parameters import from_mapping
@@ -27,6 +28,8 @@ Array = npt.NDArray[np.float64]
 Timestep = Callable[[Array, Array, Array], None]
 
 WARM_UP = 3
+COMPARED = ("measured", "edmd", "formation")
+"""Predictors that fit an operator, as the peers do."""
 
 
 def history(timesteps: int) -> tuple[Array, Array, Array]:
@@ -97,6 +100,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=50)
     parser.add_argument("--timesteps", type=int, default=100)
     parser.add_argument("--json", action="store_true")
+    add_comparisons(parser)
     args = parser.parse_args()
     data = history(args.timesteps)
     makers: dict[str, Callable[[], Timestep]] = {
@@ -116,6 +120,19 @@ def main() -> None:
         }
         for name, values in times.items()
     }
+    if args.comparisons:
+        peers = ("odmd", "lstsq")
+        print(
+            as_json(
+                Comparison(
+                    f"timestep of `{name}`", row["microseconds"], row["microseconds"] / row[f"to_{peer}"], "us", peer
+                )
+                for name, row in found.items()
+                if name in COMPARED
+                for peer in peers
+            )
+        )
+        return
     if args.json:
         print(json.dumps(found, indent=2))
         return

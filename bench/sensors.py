@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from robot_formation.analysis.markdown import interval
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.sweep_summary import median_with_interval
 from robot_formation.batch.pool import run_parallel
@@ -276,20 +277,12 @@ def ratios(results: Sequence[Result], others: Sequence[Result]) -> str:
         for a, b in zip(results, others, strict=True)
         if b[0] == "done"
     ]
-    return interval(median_with_interval(values), 1.0)
+    return interval(median_with_interval(values), 1.0, 2)
 
 
 def median_of(results: Sequence[Result], name: str, scale: float) -> str:
     values = [math.inf if outcome != "done" else totals[name] for outcome, totals in results]
-    return interval(median_with_interval([value for value in values if value is not None]), scale)
-
-
-def interval(found: Mapping[str, float | None] | None, scale: float) -> str:
-    if found is None:
-        return "-"
-    names = ("median", "low", "high")
-    middle, low, high = ("lost" if (value := found[k]) is None else f"{scale * value:.2f}" for k in names)
-    return f"{middle} ({low}..{high})"
+    return interval(median_with_interval([value for value in values if value is not None]), scale, 2)
 
 
 def calibration() -> None:

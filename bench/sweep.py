@@ -15,7 +15,8 @@ import time
 from collections.abc import Iterable
 from typing import Any
 
-from robot_formation.experiment import sweep
+from comparison import Comparison, add_comparisons, as_json
+from robot_formation.experiment import sweep, sweep_runs
 
 AIM = 60.0
 JOBS = (1, 2)
@@ -27,7 +28,7 @@ def plan(seeds: Iterable[int]) -> sweep.Plan:
 
 def runs_per_minute(count: int, jobs: int) -> float:
     began = time.perf_counter()
-    rows = list(sweep.carry_out(plan(range(count)).tasks(), (), jobs))
+    rows = list(sweep_runs.carry_out(plan(range(count)).tasks(), (), jobs))
     minutes = (time.perf_counter() - began) / 60.0
     lost = sum(row.lost for row in rows)
     if lost:
@@ -37,7 +38,7 @@ def runs_per_minute(count: int, jobs: int) -> float:
 
 def warm_up() -> None:
     for jobs in JOBS:
-        list(sweep.carry_out(plan(range(2 * jobs)).tasks(), ("leader.timesteps=1",), jobs))
+        list(sweep_runs.carry_out(plan(range(2 * jobs)).tasks(), ("leader.timesteps=1",), jobs))
 
 
 def measure(count: int, rounds: int) -> dict[str, Any]:
@@ -56,8 +57,14 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=12, help="runs per job count and round")
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--json", action="store_true")
+    add_comparisons(parser)
     args = parser.parse_args()
     found = measure(args.runs, args.rounds)
+    if args.comparisons:
+        one, two = (found["runs_per_minute"][str(jobs)] for jobs in JOBS)
+        rates = Comparison("runs with two jobs", two, AIM, "per minute", larger_is_better=True)
+        print(as_json([rates, Comparison("two jobs", two, one, "runs per minute", "one job", larger_is_better=True)]))
+        return
     if args.json:
         print(json.dumps(found, indent=2))
         return

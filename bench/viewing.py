@@ -22,6 +22,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from comparison import Comparison, add_comparisons, as_json
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.launching.launcher import Launcher
@@ -100,6 +101,7 @@ def main() -> int:
     parser.add_argument("--skip-runs", action="store_true", help="only open the bag")
     parser.add_argument("--chromium", action="store_true", help="let a headless Chromium look at the runs")
     parser.add_argument("--json", action="store_true", help="print JSON")
+    add_comparisons(parser)
     args = parser.parse_args()
     found: dict[str, dict[str, float]] = {}
     for name, factor in () if args.skip_runs else (("full speed", 0.0), ("real time", 1.0)):
@@ -113,6 +115,10 @@ def main() -> int:
         bag = args.bag or long_bag(Path(folder), args.timesteps)
         seconds = [opening_s(bag) for _ in range(args.rounds)]
         found["opening [s]"] = {"result": statistics.median(seconds), "slowest": max(seconds)}
+    if args.comparisons:
+        units = {name: "s" if name.endswith("[s]") else "times as long" for name in found}
+        print(as_json(Comparison(f"view, {name}", v["result"], AIMS[name], units[name]) for name, v in found.items()))
+        return 0
     if args.json:
         print(json.dumps(found))
     else:

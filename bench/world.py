@@ -16,10 +16,12 @@ import math
 import statistics
 import sys
 import time
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
 
+from comparison import Comparison, add_comparisons, as_json
 from fastest import fastest_ms
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import Surface, make_surface
@@ -35,6 +37,8 @@ from robot_formation.world.world import World
 ROBOTS = (1, 2, 5, 10)
 CALLS = 10
 DISTANCES_M = (0.32, 0.70)
+REAL_TIME_LIMITS = {2: 250.0, 10: 50.0}
+"""Aims by number of robots that drive."""
 
 
 class Drivers:
@@ -133,10 +137,22 @@ class Tiny:
         return np.reshape(pixels, (self._size[1], self._size[0], 4))[..., :3]
 
 
+def comparisons(value: Mapping[int | tuple[float, str], float], step_us: float) -> Iterator[Comparison]:
+    """Yield real-time factors beside their limits, and camera frames beside TinyRenderer's."""
+    for count, limit in REAL_TIME_LIMITS.items():
+        what = f"physics of {count} moving robots"
+        yield Comparison(what, step_us / value[count], limit, "times real time", larger_is_better=True)
+    for distance in DISTANCES_M:
+        what = f"camera frame, neighbour at {100.0 * distance:.0f} cm"
+        yield Comparison(what, value[distance, "full"], value[distance, "TinyRenderer"], "ms", "TinyRenderer")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=15, help="interleaved rounds (default: 15)")
-    rounds = max(1, parser.parse_args().rounds)
+    add_comparisons(parser)
+    args = parser.parse_args()
+    rounds = max(1, args.rounds)
     surface, parameters = make_surface("bowl"), WorldParameters()
     looking = pose_on_surface(surface, 1.3, 0.4, 0.5 * math.pi)
     scenes = {}
@@ -153,6 +169,9 @@ def main() -> int:
             for name, call in calls.items():
                 found[distance, name].append(fastest_ms(call, CALLS))
     value = {name: statistics.median(times) for name, times in found.items()}
+    if args.comparisons:
+        print(as_json(comparisons(value, 1e6 / parameters.physics_hz)))
+        return 0
     print(f"{'moving robots':>13} {'us per step':>12} {'real-time factor':>17}")
     for count in ROBOTS:
         print(f"{count:13} {value[count]:12.1f} {1e6 / parameters.physics_hz / value[count]:17.0f}")
