@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from marked_text import with_marked
 from robot_formation.components.catalogue import KINDS
-from robot_formation.errors import FormationError
 from robot_formation.experiment.node_defaults import node_defaults
 from robot_formation.experiment.scenario_json_schema import scenario_schema
 from robot_formation.nodes.host.ros_parameters import AT_START, HostParameters, reasons
@@ -31,7 +30,6 @@ SCHEMA = Path(__file__).parents[1] / "config" / "scenario.schema.json"
 PAGES = Path(__file__).parent / "reference" / "nodes"
 COMMON = "common"
 HEAD = "| name | type | unit | default | range | description |\n|---|---|---|---|---|---|"
-_TABLE = re.compile(r"(<!-- parameters -->\n).*?(<!-- /parameters -->)", re.DOTALL)
 _TYPES: dict[Any, str] = {
     bool: "bool",
     int: "int",
@@ -96,13 +94,8 @@ def updated(name: str, parameters: type) -> tuple[str, str]:
     Raises:
         FormationError: if the page has no place for the table.
     """
-    path = PAGES / f"{name}.md"
-    text = path.read_text(encoding="utf-8")
-    if len(_TABLE.findall(text)) != 1:
-        raise FormationError(f"{path} needs <!-- parameters --> and <!-- /parameters --> once, each on its own line")
-    return text, _TABLE.sub(
-        lambda match: f"{match[1]}{table(name, parameters)}\n\n{changes(name, parameters)}\n{match[2]}", text
-    )
+    written = f"{table(name, parameters)}\n\n{changes(name, parameters)}"
+    return with_marked(PAGES / f"{name}.md", "parameters", written)
 
 
 def _row(spec: Spec, configured: dict[str, object]) -> str:
