@@ -21,7 +21,8 @@ SIMULATED = rf"Number(({TEXT}.match(/([0-9.]+) s simulated/) || [0, 0])[1])"
 
 
 def click(label: str) -> str:
-    return f"[...document.querySelectorAll('button')].find(each => each.innerText === '{label}').click()"
+    """Click a button, if there is one with this label; give whether there was."""
+    return f"[...document.querySelectorAll('button')].some(each => each.innerText === '{label}' && !each.click())"
 
 
 class Watcher(threading.Thread):
@@ -44,16 +45,16 @@ class Watcher(threading.Thread):
             self.problem = problem
 
     def _watch(self, browser: Chromium) -> None:
-        browser.value(click("pause"))
+        browser.until(click("pause"))
         browser.until(f"{TEXT}.includes('the run is paused')")
         self.seen.append(browser.value(SIMULATED))
-        browser.value(click("one step (50 ms)"))
+        browser.until(click("one step (50 ms)"))
         browser.until(f"{SIMULATED} > {self.seen[-1]} || {TEXT}.includes('nothing is owed')")
         browser.until("[...document.querySelectorAll('canvas')].some(each => each.width > 200)")
-        browser.value(click("go on"))
-        # A browser that draws slowly may see the run's end before it has seen it go on.
+        browser.until(click("go on"))
+        # A browser that draws slowly may see the run's end before it has seen it go on; the run takes 100 s and more.
         moved = f"{SIMULATED} > {self.seen[-1] + 0.2}"
-        browser.until(moved, unless=self.run_ended.is_set)
+        browser.until(moved, unless=self.run_ended.is_set, deadline_s=300.0)
         if browser.value(moved):
             self.seen.append(browser.value(SIMULATED))
         assert browser.errors == []

@@ -60,12 +60,17 @@ class Chromium:
 
     def value(self, expression: str) -> Any:
         """Return what an expression of JavaScript gives."""
-        return self._call("Runtime.evaluate", expression=expression, returnByValue=True)["result"].get("value")
+        answer = self._evaluate(expression)
+        assert "exceptionDetails" not in answer, f"{expression}: {answer['exceptionDetails']}"
+        return answer["result"].get("value")
 
-    def until(self, expression: str, unless: Callable[[], bool] = lambda: False) -> Any:
-        """Wait until an expression gives something true, or until there is no more to wait for; return what it gave."""
-        end = time.monotonic() + DEADLINE_S
-        while not (found := self.value(expression)) and not unless():
+    def until(self, expression: str, unless: Callable[[], bool] = lambda: False, deadline_s: float = DEADLINE_S) -> Any:
+        """Wait until an expression gives something true, or until there is no more to wait for; return what it gave.
+
+        It may fail until then: a page that is still loading has no body.
+        """
+        end = time.monotonic() + deadline_s
+        while not (found := self._evaluate(expression)["result"].get("value")) and not unless():
             assert time.monotonic() < end, f"{expression} did not come true; the page says: {self.value(_TEXT)}"
             time.sleep(0.1)
         return found
@@ -92,6 +97,9 @@ class Chromium:
             pages = [page for page in json.load(answer) if page["type"] == "page"]
         return str(pages[0]["webSocketDebuggerUrl"])
 
+    def _evaluate(self, expression: str) -> dict[str, Any]:
+        return self._call("Runtime.evaluate", expression=expression, returnByValue=True)
+
     def _call(self, method: str, **parameters: object) -> dict[str, Any]:
         number = next(self._numbers)
         self._socket.send(json.dumps({"id": number, "method": method, "params": parameters}))
@@ -115,4 +123,4 @@ class Chromium:
                 self.requests.append(url)
 
 
-_TEXT = "document.body ? document.body.innerText.slice(0, 300) : ''"
+_TEXT = "document.body ? document.body.innerText.slice(0, 1000) : ''"

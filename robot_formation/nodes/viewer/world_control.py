@@ -76,9 +76,9 @@ class WorldControl:
 
     def _has_stepped(self, future: Future) -> None:
         answer = future.result()
-        self._left -= 1
-        if answer is None or not answer.success:
-            self._left = 0
+        if self._left == 0:
+            return  # somebody has let the run go on meanwhile, and what this step said is history
+        self._left = self._left - 1 if answer is not None and answer.success else 0
         self.remark = "" if answer is None else f"paused: {answer.message}"
         if self._left > 0:
             self._next_step()
