@@ -102,6 +102,15 @@ class StandIns:
         """Whether it is time to look into the graph."""
         return bool(self._missing or self._present) and self._clock() - self._looked_at >= _EVERY_S
 
+    def run_done(self) -> None:
+        """Register the end of a run that came to its last timestep: those not seen yet took part all the same.
+
+        The launcher's own view of the graph may be up to 3 s old, and a short run is over sooner.
+        """
+        for node in self._missing:
+            self._say(f"{node} was there")
+        self._missing = []
+
     def look(self, graph: Collection[str]) -> str:
         """Update with the nodes of the graph; return why the run can't go on, or an empty text.
 

@@ -216,4 +216,8 @@ if __name__ == "__main__":
     pipes = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     die_with(int(sys.argv[1]))
-    raise SystemExit(serve(*pipes, int(sys.argv[1])))
+    code = serve(*pipes, int(sys.argv[1]))
+    # Taking the interpreter down would write to all that is shared, and free nothing that outlasts a process.
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)

@@ -178,7 +178,7 @@ class Launcher:
                 ended = self._first_ended()
                 if ended is not None:
                     monitor.drain(_POLL_S, lambda: progress.complete)
-                    return self._ended_by(ended, monitor)
+                    return self._ended_by(ended, monitor, stand_ins)
                 reason = self._look(stand_ins, watchdog, monitor)
                 if self._tour_ended(progress, monitor, gone=bool(reason)):
                     return exit_codes.DONE, ""
@@ -206,12 +206,15 @@ class Launcher:
                 return child
         return None
 
-    def _ended_by(self, ended: Child, monitor: Monitor) -> tuple[int, str]:
+    def _ended_by(self, ended: Child, monitor: Monitor, stand_ins: StandIns) -> tuple[int, str]:
         """Judge a node's end, which ends the run, by the others' states; then let those that are stopped go on."""
         try:
-            return self._verdict(ended)
+            code, reason = self._verdict(ended)
         finally:
             self._resume(monitor)
+        if code == exit_codes.DONE:
+            stand_ins.run_done()
+        return code, reason
 
     def _wait_for(self, elsewhere: list[Process], folder: Path, environment: dict[str, str]) -> StandIns:
         """Tell how to start the nodes that somebody else starts, and begin to wait for them."""

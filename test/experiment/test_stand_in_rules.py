@@ -106,3 +106,12 @@ def test_the_graph_is_looked_at_now_and_then_and_never_without_stand_ins() -> No
     watched.now_s += 0.5
     assert watched.stand_ins.due
     assert not StandIns((), 10.0, watched.said.append).due
+
+
+def test_a_run_that_is_done_before_its_stand_in_was_seen_says_so_at_its_end() -> None:
+    watched = Watched()
+    one, other = DETECTORS
+    assert watched.look(one) == ""
+    watched.stand_ins.run_done()
+    assert watched.said[1:] == [f"{other} was there"]
+    assert not watched.stand_ins.awaited

@@ -50,7 +50,7 @@ from robot_formation.nodes.host.ros_parameters import (
 from robot_formation.nodes.host.signals import bounded_end, ignore_signals, stopped
 from robot_formation.parameters import specs
 
-_IDLE_S = 0.1  # how often an idle node looks for signals
+_IDLE_S = 0.03  # how often an idle node looks for signals
 _HELD_BACK_S = 0.01  # how often it looks for listeners while messages are held back
 _DIAGNOSTICS_S = 1.0
 _ACKNOWLEDGED_S = 2.0
@@ -167,7 +167,8 @@ class Host:
         self._transform_topics = transform_topics() if kind == "world" else []
         self._transforms = LiveTransforms(node.get_namespace()) if self._transform_topics else None
         self._publishers: dict[names.Topic, Message] = {}
-        self._awaited = [names.absolute(home, name) for name in self._parameters.wait_for_nodes]
+        awaited = [names.absolute(home, name) for name in self._parameters.wait_for_nodes]
+        self._awaited = [name for name in awaited if name != node.get_fully_qualified_name()]
         self._heard_s = time.monotonic()
         self._failure: FormationError | None = None
         self._connect()

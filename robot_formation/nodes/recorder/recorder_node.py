@@ -40,9 +40,9 @@ _DISCOVERY_S = 0.05
 _REVIEW_S = 1.0
 _TICK_TYPE = "std_msgs/msg/UInt32"
 _AFTER_TICK_S = 0.01  # what belongs to a timestep arrives well within this after its tick
-_IDLE_S = 0.05
+_IDLE_S = 0.03
 _OLDEST_CHUNK_S = 1.0
-_ROUND_S = 0.03
+_ROUND_S = 0.01
 _QUIET_ROUNDS = 4  # without a message after the signal to end: everything sent has arrived
 _LONGEST_DRAIN_S = 5.0
 
