@@ -95,7 +95,7 @@ class Panel:
         finished = f"{now.finished} of {timesteps}" if timesteps else str(now.finished)
         lines = [
             f"**{plain(self.follower.replace('_', ' '))}** {plain(now.words)}",
-            f"{moment.stamp_ns * 1e-9:.1f} s simulated, {finished} timesteps finished",
+            f"{moment.stamp_ns * 1e-9:.2f} s simulated, {finished} timesteps finished",
             plain(figures_in_words(figures)),
             plain(remark),
         ]

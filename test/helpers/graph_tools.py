@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -118,3 +119,13 @@ class Killer:
     def say(self, text: str) -> None:
         if text.startswith(self._line):
             os.kill(self.pids[self._node], self._number)
+            if self._number is signal.SIGSTOP:
+                self._until_stopped(self.pids[self._node])
+
+    @staticmethod
+    def _until_stopped(pid: int) -> None:
+        """A busy process takes a moment to stop, and the run may look at its state at once."""
+        end = time.monotonic() + 10.0
+        while Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "T":
+            assert time.monotonic() < end, f"process {pid} does not stop"
+            time.sleep(0.001)
