@@ -18,17 +18,24 @@ from robot_formation.parameters import parameter
 # All chosen.
 _MEMORY = 0.6
 """Share of earlier deviations in the sum that is compared with the bound: turns lead several steps to the same side."""
+_SUM_SCATTER = 1.0 / math.sqrt(1.0 - _MEMORY**2)
+"""Scatter of such a sum of independent deviations, in that of a single one."""
 _EARLY = 5
-"""Deviations before their own scatter is known well enough: until then the forecasts' standard deviations count."""
+"""Deviations before the sum's own scatter is known well enough: until then the forecasts' standard deviations count."""
 _FIRST_SCATTER_M, _LEAST_SCATTER_M = 0.003, 0.0015
-"""Scatter of the deviations beforehand, and the least: of leaders that drive straight ahead it is 1.5 to 2.5 mm."""
-_SCATTER_GAIN, _SCATTER_MARGIN = 0.15, 1.25
-"""Weight of the latest deviation in the mean of their squares, and a factor on what follows from so few. Without it
-the larger deviations of `previous` and `measured` called for checks of leaders that drive straight ahead."""
+"""Scatter of a deviation beforehand, and the least: of leaders that drive straight ahead it is 1.5 to 2.5 mm."""
+_SCATTER_GAIN, _SCATTER_MARGIN = 0.15, 1.15
+"""Weight of the latest sum in the mean of their squares, and a factor on what follows from so few. With a factor of 1
+leaders that drive straight ahead were checked twice as often with `previous`."""
 _OUTLIER_SIGMAS = 3.0
-"""A deviation counts as so many times the scatter at most: else a turn would hide itself by the scatter it makes."""
+"""A sum counts as so many times the scatter at most: else a turn would hide itself by the scatter it makes."""
 _FOUND_RAD = math.radians(3.0)
 """A heading that a check finds so far from where it was expected had turned unnoticed."""
+_UNEXPECTED_RAD = 2.0 * _FOUND_RAD
+"""The same where a turn by forecast has called for the check: slip and forecasts err by up to 5 degrees until then."""
+_HALFWAY = 0.5
+"""Share of both bounds, of turns and of deviations, from which on the two together call for a check: the end of a turn
+shows as deviations, and before the next check of a turn the follower would turn on for up to four timesteps."""
 _FOLLOW_UPS = 2
 """Checks in the timesteps after an unnoticed turn: from them the predictor learns the turn of a timestep."""
 _CAUGHT_UP = 0.5
@@ -48,7 +55,7 @@ class HeadingCheckParameters:
         3.0,
         "Sum of the steps' deviations aside from their forecasts, in standard deviations of such deviations so far, "
         "earlier ones counting less, from which on the heading is checked; twice as much after each check that finds "
-        "no turn",
+        "no turn, half as much after half of turned_rad",
         low=0.1,
         high=1e6,
     )
@@ -71,21 +78,39 @@ class Deviation(NamedTuple):
     sigma_m: float
 
 
-class _Scatter:
-    """How far steps usually end aside of their forecasts: a forecast's own covariance is two to four times too wide."""
+class _DeviationSum:
+    """Deviations summed up, earlier ones counting less, and how far that sum usually goes.
+
+    A forecast's own covariance is two to four times too wide. The sum's scatter says more than that of single
+    deviations: those of `previous` and `measured` depend on each other.
+
+    Attributes:
+        sigmas: the sum in standard deviations of a single deviation, if they are independent.
+    """
 
     def __init__(self) -> None:
-        self._square_m2 = _FIRST_SCATTER_M**2
+        self.sigmas = self._sum_m = 0.0
+        self._square_m2 = (_FIRST_SCATTER_M * _SUM_SCATTER) ** 2
         self._count = 0
 
-    def in_sigmas(self, deviation: Deviation) -> float:
-        """Return a deviation in standard deviations of the earlier ones, and count it in."""
-        usual_m = max(_SCATTER_MARGIN * math.sqrt(self._square_m2), _LEAST_SCATTER_M)
-        scatter_m = deviation.sigma_m if self._count < _EARLY else min(usual_m, deviation.sigma_m)
-        counted_m = min(abs(deviation.aside_m), _OUTLIER_SIGMAS * scatter_m)
+    def add(self, deviation: Deviation | None) -> None:
+        """Count a timestep's deviation in; None where it isn't known."""
+        self.sigmas *= _MEMORY
+        self._sum_m *= _MEMORY
+        if deviation is None:
+            return
+        self._sum_m += deviation.aside_m
+        stated_m = _SUM_SCATTER * deviation.sigma_m
+        usual_m = max(_SCATTER_MARGIN * math.sqrt(self._square_m2), _SUM_SCATTER * _LEAST_SCATTER_M)
+        scatter_m = stated_m if self._count < _EARLY else min(usual_m, stated_m)
+        counted_m = min(abs(self._sum_m), _OUTLIER_SIGMAS * scatter_m)
         self._square_m2 += _SCATTER_GAIN * (counted_m**2 - self._square_m2)
         self._count += 1
-        return deviation.aside_m / scatter_m
+        self.sigmas = _SUM_SCATTER * self._sum_m / scatter_m
+
+    def clear(self) -> None:
+        """Begin a new sum."""
+        self.sigmas = self._sum_m = 0.0
 
 
 class HeadingCheck:
@@ -100,8 +125,7 @@ class HeadingCheck:
     def __init__(self, parameters: HeadingCheckParameters) -> None:
         self._p = parameters
         self._turned_rad = 0.0
-        self._beside_sigmas = 0.0
-        self._scatter = _Scatter()
+        self._deviations = _DeviationSum()
         self._patience = 1.0
         self._follow_ups = 0
         self._beside = self._follow_up = False  # what called for the latest check
@@ -121,22 +145,23 @@ class HeadingCheck:
             sigma_rad: standard deviation of the heading.
         """
         p = self._p
-        self._beside_sigmas *= _MEMORY
-        if deviation is not None:
-            self._beside_sigmas += self._scatter.in_sigmas(deviation)
+        self._deviations.add(deviation)
         self._beside, self._follow_up = False, self._follow_ups > 0
         if self._follow_up:
             self._follow_ups -= 1
             return True
-        self._beside = abs(self._beside_sigmas) > self._patience * p.beside_sigmas
-        return self._beside or abs(self._turned_rad) > p.turned_rad or sigma_rad > p.sigma_rad
+        beside = abs(self._deviations.sigmas) / (self._patience * p.beside_sigmas)
+        turned = abs(self._turned_rad) / p.turned_rad
+        self._beside = beside > 1.0
+        return max(beside, turned) > 1.0 or min(beside, turned) > _HALFWAY or sigma_rad > p.sigma_rad
 
     def done(self, change_rad: float) -> None:
         """Process a check: how far from where it was expected the heading was found."""
-        self._turned_rad = self._beside_sigmas = 0.0
+        self._turned_rad = 0.0
+        self._deviations.clear()
         if self._follow_up:
             return
-        if not self._beside:
+        if not self._beside and abs(change_rad) < _UNEXPECTED_RAD:
             self.caught_up_rad = _CAUGHT_UP * abs(change_rad)
         elif abs(change_rad) > _FOUND_RAD:
             self._patience, self._follow_ups = 1.0, _FOLLOW_UPS

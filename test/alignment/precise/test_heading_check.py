@@ -115,7 +115,29 @@ def test_after_an_unnoticed_turn_two_more_timesteps_are_checked() -> None:
 
 def test_a_check_that_was_called_for_by_turns_finds_no_fault_with_the_forecasts() -> None:
     every = math.floor(P.turned_rad / 0.15) + 1
-    assert checks([0.0] * 8, turn_rad=0.15, found_rad=0.2) == list(range(every, 9, every))
+    assert checks([0.0] * 8, turn_rad=0.15, found_rad=0.08) == list(range(every, 9, every))
+
+
+@pytest.mark.parametrize(("turned", "beside", "checked"), [(0.6, 0.6, True), (0.6, 0.4, False), (0.4, 0.9, False)])
+def test_half_of_a_turn_and_half_of_a_deviation_call_for_a_check_together(
+    turned: float, beside: float, checked: bool
+) -> None:
+    check = HeadingCheck(P)
+    check.stepped(turned * P.turned_rad)
+    assert check.due(by_forecast(beside * P.beside_sigmas), KNOWN_RAD) == checked
+
+
+def test_a_check_after_turns_that_finds_their_end_is_followed_by_two_more() -> None:
+    check = HeadingCheck(P)
+    check.stepped(1.1 * P.turned_rad)
+    assert check.due(by_forecast(0.0), KNOWN_RAD)
+    check.done(-0.2)
+    assert check.caught_up_rad == 0.0
+    for due in (True, True, False):
+        check.stepped(0.0)
+        assert check.due(by_forecast(0.0), KNOWN_RAD) == due
+        if due:
+            check.done(0.0)
 
 
 def test_half_of_what_a_check_after_turns_finds_counts_as_caught_up_in_its_timestep() -> None:
