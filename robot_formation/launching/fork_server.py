@@ -51,12 +51,12 @@ class ForkServer:
     """The launcher's side: a server process while the nodes start; use it as a context manager.
 
     Args:
-        environment: of the server and so of all nodes.
+        environment: of the server and so of all nodes; an attribute too.
         log: file for what the server itself prints: errors.
     """
 
     def __init__(self, environment: Mapping[str, str], log: Path) -> None:
-        self._environment, self._log = environment, log
+        self.environment, self._log = environment, log
 
     def __enter__(self) -> ForkServer:
         self._stack = contextlib.ExitStack()
@@ -68,7 +68,7 @@ class ForkServer:
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     stderr=log,
-                    env=dict(self._environment),
+                    env=dict(self.environment),
                     start_new_session=True,
                 )
             assert process.stdin is not None

@@ -137,12 +137,11 @@ class Launcher:
                 self._settle(result)
         return result
 
-    def _start(self, table: list[Process], folder: Path, environment: dict[str, str]) -> None:
-        with ForkServer(environment, folder / "fork_server.log") as server:
-            for process in table:
-                if self._signals.count:
-                    return
-                self._children.append(Child(process, folder, server, lambda: bool(self._signals.count)))
+    def _start(self, table: list[Process], folder: Path, server: ForkServer) -> None:
+        for process in table:
+            if self._signals.count:
+                return
+            self._children.append(Child(process, folder, server, lambda: bool(self._signals.count)))
 
     def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
         """Start the nodes and follow the run until something ends it; return the exit code and why."""
@@ -154,40 +153,55 @@ class Launcher:
             table.append(viewer(self.scenario, self.view_port))
             announcement = Announcement(self.view_port, self._tell)
         self._tell(f"starting {len(table)} nodes ...")
-        from robot_formation.nodes.progress.monitor import Monitor  # here, since it needs the environment of the wheels
-
         began = time.monotonic()
         progress = self._progress(lambda: time.monotonic() - began)
-        # The monitor joins first: the nodes then know of it before they send anything.
-        with Monitor(environment, progress.topics, progress.listen) as monitor:
+        with contextlib.ExitStack() as stack:
             try:
-                self._start(table, folder, environment)
+                # Two processes import ROS at the same time: that of the nodes, and this one.
+                with ForkServer(environment, folder / "fork_server.log") as server:
+                    from robot_formation.nodes.progress.monitor import Monitor  # needs the environment of the wheels
+
+                    # The monitor joins first: the nodes then know of it before they send anything.
+                    monitor = stack.enter_context(Monitor(environment, progress.topics, progress.listen))
+                    self._start(table, folder, server)
             except NodeNotStartedError as error:
                 interrupted = bool(self._signals.count)
                 return (exit_codes.INTERRUPTED, "interrupted") if interrupted else (exit_codes.NODE_DIED, str(error))
-            watchdog = Watchdog([child.name for child in self._needed], idle_s=self._patience_s())
             stand_ins = self._wait_for(elsewhere, folder, environment)
-            while True:
-                monitor.spin(_POLL_S)
-                if announcement is not None:
-                    announcement.look()
-                if monitor.messages and not result.startup_s:
-                    result.startup_s = time.monotonic() - began
-                if self._signals.count:
-                    return exit_codes.INTERRUPTED, "interrupted"
-                ended = self._first_ended()
-                if ended is not None:
-                    monitor.drain(_POLL_S, lambda: progress.complete)
-                    return self._ended_by(ended, monitor, stand_ins)
-                reason = self._look(stand_ins, watchdog, monitor)
-                if self._tour_ended(progress, monitor, gone=bool(reason)):
-                    return exit_codes.DONE, ""
-                if reason:
-                    self._tell(f"{reason}; ending the run ...")
-                    self._resume(monitor)
-                    return exit_codes.NODE_DIED, reason
-                if not stand_ins.awaited and time.monotonic() - self._said_at > _REMIND_S:
-                    progress.remind()
+            return self._follow(monitor, progress, stand_ins, announcement, began, result)
+
+    def _follow(
+        self,
+        monitor: Monitor,
+        progress: Progress,
+        stand_ins: StandIns,
+        announcement: Announcement | None,
+        began: float,
+        result: RunResult,
+    ) -> tuple[int, str]:
+        """Follow the run until something ends it; return the exit code and why."""
+        watchdog = Watchdog([child.name for child in self._needed], idle_s=self._patience_s())
+        while True:
+            monitor.spin(_POLL_S)
+            if announcement is not None:
+                announcement.look()
+            if monitor.messages and not result.startup_s:
+                result.startup_s = time.monotonic() - began
+            if self._signals.count:
+                return exit_codes.INTERRUPTED, "interrupted"
+            ended = self._first_ended()
+            if ended is not None:
+                monitor.drain(_POLL_S, lambda: progress.complete)
+                return self._ended_by(ended, monitor, stand_ins)
+            reason = self._look(stand_ins, watchdog, monitor)
+            if self._tour_ended(progress, monitor, gone=bool(reason)):
+                return exit_codes.DONE, ""
+            if reason:
+                self._tell(f"{reason}; ending the run ...")
+                self._resume(monitor)
+                return exit_codes.NODE_DIED, reason
+            if not stand_ins.awaited and time.monotonic() - self._said_at > _REMIND_S:
+                progress.remind()
 
     def _progress(self, elapsed: Callable[[], float]) -> Progress:
         delayed = self.scenario.setup.spacing is Spacing.DELAYED

@@ -14,7 +14,7 @@ FOLDER = ROOT / "docs" / "tutorial"
 TUTORIALS = sorted(FOLDER.glob("*.py"))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("tutorial", TUTORIALS, ids=lambda file: file.stem)
 def test_a_tutorial_runs_as_a_script(tutorial: Path, tmp_path: Path) -> None:
     pytest.importorskip("pandas")

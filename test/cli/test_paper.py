@@ -17,7 +17,7 @@ from robot_formation.experiment import sweep_runs
 from robot_formation.paper import work as work_module
 from robot_formation.paper.statements import FIGURES
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("paper")]
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("paper")]
 
 QUICK = ("--seeds", "1", "--repeats", "1", "--step", "0.45", "--jobs", "1", "--set", "leader.timesteps=1")
 

@@ -154,7 +154,7 @@ def test_a_run_through_the_graph_prints_json_only_and_its_bag_is_complete(tmp_pa
         assert opened.metadata("robot_formation")["predictor"] == "formation"
 
 
-@pytest.mark.parametrize("where", ["process", pytest.param("graph", marks=pytest.mark.graph)])
+@pytest.mark.parametrize("where", ["process", pytest.param("graph", marks=[pytest.mark.graph, pytest.mark.long])])
 @pytest.mark.xdist_group("cli_run")
 def test_a_split_bag_is_the_same_run_in_several_files(tmp_path: Path, where: str) -> None:
     options = ["--camera", "on_demand", "--set", "leader.timesteps=4", "--json"]

@@ -37,6 +37,7 @@ def scored(tmp_path_factory: pytest.TempPathFactory) -> "subprocess.CompletedPro
     return call(folder, "mine:Last", "--quick", "--json", "--jobs", "2")
 
 
+@pytest.mark.long
 def test_a_class_of_ones_own_stands_beside_those_that_came_before(scored: Any) -> None:
     assert scored.returncode == 0, scored.stderr
     found = json.loads(scored.stdout)
@@ -51,6 +52,7 @@ def test_a_class_of_ones_own_stands_beside_those_that_came_before(scored: Any) -
     assert found["conditions"]["mode"] == "paper"
 
 
+@pytest.mark.long
 def test_progress_goes_to_standard_error_and_the_seeds_are_told_nowhere(scored: Any) -> None:
     assert scored.stderr.splitlines()[0] == "4 predictors, 20 runs"
     assert "20/20 runs" in scored.stderr

@@ -11,7 +11,7 @@ from robot_formation import names
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("barrier")]
 
 
-@pytest.mark.parametrize("followers", [1, 2])
+@pytest.mark.parametrize("followers", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_a_follower_hears_nothing_but_itself_and_its_neighbours_tick(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, followers: int
 ) -> None:

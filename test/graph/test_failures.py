@@ -40,7 +40,7 @@ def shared_memory_ports(domain: int) -> list[str]:
     return [name for name in os.listdir("/dev/shm") if any(name.endswith(p) or f"{p}_" in name for p in ports)]
 
 
-@pytest.mark.parametrize("node", KILLED)
+@pytest.mark.parametrize("node", [KILLED[0], *(pytest.param(node, marks=pytest.mark.long) for node in KILLED[1:])])
 def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path: Path, node: str) -> None:
     killer = Killer(node, signal.SIGKILL, after_timesteps=3)
     domains = []

@@ -86,6 +86,7 @@ def test_the_examples_own_tests_pass(with_example: dict[str, str]) -> None:
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.long
 def test_the_packages_own_nodes_started_by_hand_give_the_same_run(tmp_path: Path) -> None:
     scenario = short_scenario("followers=2", "leader.timesteps=2", track="one")
     left_out = ("world", "follower_2/block_detector", "leader/leader")
@@ -100,6 +101,7 @@ def test_the_packages_own_nodes_started_by_hand_give_the_same_run(tmp_path: Path
         assert len(one) == 2
 
 
+@pytest.mark.long
 def test_a_killed_stand_in_ends_the_run_by_name_with_a_readable_bag(tmp_path: Path) -> None:
     with starter() as others:
 

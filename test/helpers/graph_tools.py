@@ -16,6 +16,7 @@ from robot_formation.analysis.from_bag import load_run
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.run_result import RunResult
 from robot_formation.experiment.scenario import Scenario
+from robot_formation.launching.fork_server import ForkServer
 from robot_formation.launching.launcher import Launcher
 from robot_formation.launching.processes import Process
 
@@ -57,10 +58,10 @@ def launch(
     launcher = Launcher(scenario, bag, **options)
     start = launcher._start
 
-    def observed(table: list[Process], folder: Path, environment: dict[str, str]) -> None:
-        start(table, folder, environment)
+    def observed(table: list[Process], folder: Path, server: ForkServer) -> None:
+        start(table, folder, server)
         if on_start is not None:
-            on_start(int(environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in launcher._children})
+            on_start(int(server.environment["ROS_DOMAIN_ID"]), {child.name: child.pid for child in launcher._children})
 
     launcher._start = observed  # type: ignore[method-assign]
     return launcher.run()

@@ -9,7 +9,7 @@ import pytest
 from project_table import installed_files
 from source_copy import build_archive, copy_source, source_files
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("archives")]
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("archives")]
 NAME = "robot_formation-0.1.0"
 LEFT_OUT = {".gitattributes", ".gitignore"}  # say something to git only
 

@@ -13,7 +13,7 @@ import pytest
 from repository import ROOT
 from source_copy import build_archive, copy_source
 
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("base_install")]
+pytestmark = [pytest.mark.long, pytest.mark.xdist_group("base_install")]
 SAMPLE = ROOT / "bags" / "samples" / "track_two_formation"
 # What would make an environment find more than it has.
 _OTHERS = ("PYTHONPATH", "PYTHONHOME", "AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "VIRTUAL_ENV")

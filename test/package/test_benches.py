@@ -44,7 +44,7 @@ def test_what_is_no_comparison_is_refused(text: str) -> None:
         from_json(text)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_one_bench_through_the_command(tmp_path: Path) -> None:
     command = [sys.executable, "bench/all.py", "--quick", "--only", "growth", "--out", str(tmp_path / "table.md")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -42,7 +42,7 @@ def test_the_exit_code_is_zero_if_all_passed(tmp_path: Path) -> None:
     assert done.stdout.endswith("\nall passed\n")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_process_that_a_part_leaves_does_not_keep_the_output_open(tmp_path: Path) -> None:
     command = copy_of_the_script(tmp_path, "setsid sleep 600 & echo $! >left")
     try:

@@ -87,7 +87,7 @@ def inventory(site: Path) -> dict[str, str]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.xdist_group("docs_site")
 @pytest.mark.parametrize("module", ["robot_formation", "robot_formation.koopman", "robot_formation.testing"])
 def test_every_public_name_has_a_page(site: Path, module: str) -> None:
@@ -100,7 +100,7 @@ def test_every_public_name_has_a_page(site: Path, module: str) -> None:
     assert all((site / page).is_file() for page in pages)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.xdist_group("docs_site")
 def test_every_page_of_the_folders_is_in_the_site(site: Path) -> None:
     docs = ROOT / "docs"
@@ -111,7 +111,7 @@ def test_every_page_of_the_folders_is_in_the_site(site: Path) -> None:
         assert (site / f"{made}.html").is_file()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.xdist_group("docs_site")
 def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site: Path) -> None:
     pages = {file.relative_to(site).as_posix(): Page(file) for file in site.rglob("*.html")}
@@ -134,7 +134,7 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site: Path) -
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", file.read_text(encoding="utf-8")), file
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.xdist_group("docs_site")
 def test_pages_fit_a_narrow_screen(site: Path, tmp_path: Path) -> None:
     with Chromium(tmp_path) as browser:

@@ -26,7 +26,9 @@ def pair(name: str) -> tuple[BlockDetector, LiteralDetector]:
     return BlockDetector(GROUPS["G1"], SETTINGS[name]), LiteralDetector(GROUPS["G1"], SETTINGS[name])
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize(
+    "name", ["default", *(pytest.param(n, marks=pytest.mark.long) for n in ("paper", "wide and few"))]
+)
 def test_random_pictures_give_the_segments_and_boxes_of_the_literal_reading(name: str) -> None:
     fast, literal = pair(name)
     for seed in range(336):
