@@ -18,17 +18,15 @@ from robot_formation.parameters import parameter
 # All chosen.
 _MEMORY = 0.6
 """Share of earlier deviations in the sum that is compared with the bound: turns lead several steps to the same side."""
-_SUM_SCATTER = 1.0 / math.sqrt(1.0 - _MEMORY**2)
-"""Scatter of such a sum of independent deviations, in that of a single one."""
 _EARLY = 5
-"""Deviations before the sum's own scatter is known well enough: until then the forecasts' standard deviations count."""
+"""Deviations before their own scatter is known well enough: until then the forecasts' standard deviations count."""
 _FIRST_SCATTER_M, _LEAST_SCATTER_M = 0.003, 0.0015
-"""Scatter of a deviation beforehand, and the least: of leaders that drive straight ahead it is 1.5 to 2.5 mm."""
-_SCATTER_GAIN, _SCATTER_MARGIN = 0.15, 1.15
-"""Weight of the latest sum in the mean of their squares, and a factor on what follows from so few. With a factor of 1
-leaders that drive straight ahead were checked twice as often with `previous`."""
+"""Scatter of the deviations beforehand, and the least: of leaders that drive straight ahead it is 1.5 to 2.5 mm."""
+_SCATTER_GAIN, _SCATTER_MARGIN = 0.15, 1.25
+"""Weight of the latest deviation in the mean of their squares, and a factor on what follows from so few. Without it
+the larger deviations of `previous` and `measured` called for checks of leaders that drive straight ahead."""
 _OUTLIER_SIGMAS = 3.0
-"""A sum counts as so many times the scatter at most: else a turn would hide itself by the scatter it makes."""
+"""A deviation counts as so many times the scatter at most: else a turn would hide itself by the scatter it makes."""
 _FOUND_RAD = math.radians(3.0)
 """A heading that a check finds so far from where it was expected had turned unnoticed."""
 _UNEXPECTED_RAD = 2.0 * _FOUND_RAD
@@ -78,39 +76,21 @@ class Deviation(NamedTuple):
     sigma_m: float
 
 
-class _DeviationSum:
-    """Deviations summed up, earlier ones counting less, and how far that sum usually goes.
-
-    A forecast's own covariance is two to four times too wide. The sum's scatter says more than that of single
-    deviations: those of `previous` and `measured` depend on each other.
-
-    Attributes:
-        sigmas: the sum in standard deviations of a single deviation, if they are independent.
-    """
+class _Scatter:
+    """How far steps usually end aside of their forecasts: a forecast's own covariance is two to four times too wide."""
 
     def __init__(self) -> None:
-        self.sigmas = self._sum_m = 0.0
-        self._square_m2 = (_FIRST_SCATTER_M * _SUM_SCATTER) ** 2
+        self._square_m2 = _FIRST_SCATTER_M**2
         self._count = 0
 
-    def add(self, deviation: Deviation | None) -> None:
-        """Count a timestep's deviation in; None where it isn't known."""
-        self.sigmas *= _MEMORY
-        self._sum_m *= _MEMORY
-        if deviation is None:
-            return
-        self._sum_m += deviation.aside_m
-        stated_m = _SUM_SCATTER * deviation.sigma_m
-        usual_m = max(_SCATTER_MARGIN * math.sqrt(self._square_m2), _SUM_SCATTER * _LEAST_SCATTER_M)
-        scatter_m = stated_m if self._count < _EARLY else min(usual_m, stated_m)
-        counted_m = min(abs(self._sum_m), _OUTLIER_SIGMAS * scatter_m)
+    def in_sigmas(self, deviation: Deviation) -> float:
+        """Return a deviation in standard deviations of the earlier ones, and count it in."""
+        usual_m = max(_SCATTER_MARGIN * math.sqrt(self._square_m2), _LEAST_SCATTER_M)
+        scatter_m = deviation.sigma_m if self._count < _EARLY else min(usual_m, deviation.sigma_m)
+        counted_m = min(abs(deviation.aside_m), _OUTLIER_SIGMAS * scatter_m)
         self._square_m2 += _SCATTER_GAIN * (counted_m**2 - self._square_m2)
         self._count += 1
-        self.sigmas = _SUM_SCATTER * self._sum_m / scatter_m
-
-    def clear(self) -> None:
-        """Begin a new sum."""
-        self.sigmas = self._sum_m = 0.0
+        return deviation.aside_m / scatter_m
 
 
 class HeadingCheck:
@@ -125,7 +105,8 @@ class HeadingCheck:
     def __init__(self, parameters: HeadingCheckParameters) -> None:
         self._p = parameters
         self._turned_rad = 0.0
-        self._deviations = _DeviationSum()
+        self._beside_sigmas = 0.0
+        self._scatter = _Scatter()
         self._patience = 1.0
         self._follow_ups = 0
         self._beside = self._follow_up = False  # what called for the latest check
@@ -145,20 +126,21 @@ class HeadingCheck:
             sigma_rad: standard deviation of the heading.
         """
         p = self._p
-        self._deviations.add(deviation)
+        self._beside_sigmas *= _MEMORY
+        if deviation is not None:
+            self._beside_sigmas += self._scatter.in_sigmas(deviation)
         self._beside, self._follow_up = False, self._follow_ups > 0
         if self._follow_up:
             self._follow_ups -= 1
             return True
-        beside = abs(self._deviations.sigmas) / (self._patience * p.beside_sigmas)
+        beside = abs(self._beside_sigmas) / (self._patience * p.beside_sigmas)
         turned = abs(self._turned_rad) / p.turned_rad
         self._beside = beside > 1.0
         return max(beside, turned) > 1.0 or min(beside, turned) > _HALFWAY or sigma_rad > p.sigma_rad
 
     def done(self, change_rad: float) -> None:
         """Process a check: how far from where it was expected the heading was found."""
-        self._turned_rad = 0.0
-        self._deviations.clear()
+        self._turned_rad = self._beside_sigmas = 0.0
         if self._follow_up:
             return
         if not self._beside and abs(change_rad) < _UNEXPECTED_RAD:
