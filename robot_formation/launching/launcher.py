@@ -30,7 +30,7 @@ from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
 from robot_formation.leader.paths import Teleop
 from robot_formation.names import ONLOOKERS
 from robot_formation.network.ros_domain import DomainReservation
-from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, is_of_domain
+from robot_formation.network.shared_memory import clean_after_graph
 from robot_formation.schedule.schedules import Spacing
 from robot_formation.system.signal_handling import SignalCounter
 from robot_formation.system.temporary_folder import RUN, temporary_folder
@@ -42,7 +42,6 @@ _POLL_S = 0.05
 _A_PERSONS_PATIENCE_S = 86400.0
 """A leader that a person drives may stand for a day."""
 _REMIND_S = 15.0  # without a line of progress
-_CLEANING_ROUNDS = 6
 _CAUGHT_UP_REPORTS, _CATCH_UP_S = 3, 10.0
 _ORDERLY = (exit_codes.DONE, exit_codes.LOST)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
@@ -54,15 +53,6 @@ _RECORDER_STOP_SIGNALS = (
     (signal.SIGTERM, RECORDER_PATIENCE_S[1]),
     (signal.SIGKILL, 1.0),
 )
-
-
-def _clean_shared_memory(domain: int) -> None:
-    """Remove what dead processes left, in rounds: the middleware lets go of the last files in its own time."""
-    for _ in range(_CLEANING_ROUNDS):
-        clean_orphans()
-        if not any(is_of_domain(group, domain) for group in fast_dds_files()):
-            return
-        time.sleep(_POLL_S)
 
 
 def _how_to_drive(domain: int) -> str:
@@ -119,7 +109,7 @@ class Launcher:
             folder = stack.enter_context(temporary_folder(RUN))
             domain = stack.enter_context(DomainReservation())
             # Those of every domain: also what a run left whose launcher was killed itself.
-            stack.callback(_clean_shared_memory, domain)
+            stack.callback(clean_after_graph, domain)
             result = RunResult(exit_codes.NODE_DIED, self.bag)
             began = time.monotonic()
             try:

@@ -12,12 +12,17 @@ import contextlib
 import fcntl
 import os
 import re
+import time
 from pathlib import Path
 
+from robot_formation.network.port_mutex import PortMutex
 from robot_formation.network.ros_domain import FIRST_PORT, domain_ports
 from robot_formation.network.shared_memory_space import SHARED_MEMORY
 
 _NAME = re.compile(r"(?:sem\.)?(?P<group>fastrtps_(?:[0-9a-f]{16}|port(?P<port>\d+)))(?P<part>_el|_sl|_mutex)?")
+
+
+_ROUNDS, _ROUND_S = 6, 0.05
 
 
 class TracingFiles:
@@ -51,11 +56,11 @@ def fast_dds_files(folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
 
 def find_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
     """List the groups of files whose owners are all dead; removes nothing. Arguments as for clean_orphans."""
-    groups = {group: names for group, names in fast_dds_files(folder).items() if is_of_domain(group, domain)}
+    groups = {group: names for group, names in fast_dds_files(folder).items() if _is_of_domain(group, domain)}
     if not groups:
         return {}
-    in_use = _used_files(folder)
-    return {group: names for group, names in groups.items() if in_use.isdisjoint(names) and _unlocked(folder, names)}
+    in_use = _in_use(folder) | _locked()
+    return {group: names for group, names in groups.items() if in_use.isdisjoint(_inodes(folder, names))}
 
 
 def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> list[str]:
@@ -70,19 +75,48 @@ def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> li
         The names of the removed files. Files that this user may not remove are passed over.
     """
     removed: list[str] = []
-    for names in find_orphans(domain, folder).values():
-        held = _lock_all(folder, names)  # kept while removing, so that no new process takes the files over meanwhile
-        if held is None:
+    for group in find_orphans(domain, folder):
+        if folder != SHARED_MEMORY or "port" not in group:  # segments are opened by one process, and have no mutex
+            removed += _remove_unlocked(group, folder)
             continue
-        for name in names:
-            with contextlib.suppress(OSError):
-                (folder / name).unlink()
-                removed.append(name)
-        _unlock(held)
+        with contextlib.suppress(OSError):
+            with PortMutex(group) as taken:
+                if taken:
+                    removed += _remove_unlocked(group, folder)
+            if not taken and _in_use(folder).isdisjoint(_inodes(folder, [f"sem.{group}_mutex"])):
+                removed += _remove_unlocked(group, folder)  # its owner was killed while it had the mutex
     return removed
 
 
-def is_of_domain(group: str, domain: int | None) -> bool:
+def clean_after_graph(domain: int) -> None:
+    """Remove what dead processes left, this domain's in rounds: Fast DDS lets go of the last files in its own time."""
+    for _ in range(_ROUNDS):
+        clean_orphans()
+        if not any(_is_of_domain(group, domain) for group in fast_dds_files()):
+            return
+        time.sleep(_ROUND_S)
+
+
+def _remove_unlocked(group: str, folder: Path) -> list[str]:
+    """Remove a group's files as they are now, unless one is locked; returns the names of those removed.
+
+    Under the port's mutex none is half open. Without the mutex a process that had just opened a dead one's port lost
+    the port's file, locked the new lock file, and every process started afterwards found this port broken.
+    """
+    names = fast_dds_files(folder).get(group, [])
+    held = _lock_all(folder, names)
+    if held is None:
+        return []
+    removed = []
+    for name in names:
+        with contextlib.suppress(OSError):
+            (folder / name).unlink()
+            removed.append(name)
+    _unlock(held)
+    return removed
+
+
+def _is_of_domain(group: str, domain: int | None) -> bool:
     """Return whether a group may be one of this domain: a segment, a port of the domain, or one that all share."""
     match = _NAME.fullmatch(group)
     if domain is None or match is None or match["port"] is None:
@@ -91,11 +125,14 @@ def is_of_domain(group: str, domain: int | None) -> bool:
     return port < FIRST_PORT or port in domain_ports(domain)
 
 
-def _unlocked(folder: Path, names: list[str]) -> bool:
-    held = _lock_all(folder, names)
-    if held is not None:
-        _unlock(held)
-    return held is not None
+def _locked() -> set[int]:
+    """List the inodes of locked files. To try their locks would make those fail who want them at that moment."""
+    found = set()
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/locks").read_text().splitlines():
+            place = next(word for word in line.split() if word.count(":") == 2)  # major:minor:inode
+            found.add(int(place.rpartition(":")[2]))
+    return found
 
 
 def _lock_all(folder: Path, names: list[str]) -> list[int] | None:
@@ -122,23 +159,30 @@ def _unlock(descriptors: list[int]) -> None:
         os.close(descriptor)
 
 
-def _used_files(folder: Path) -> set[str]:
-    """List the files in the folder that any process has open or mapped, as far as this user can see.
+def _inodes(folder: Path, names: list[str]) -> set[int]:
+    found = set()
+    for name in names:
+        with contextlib.suppress(OSError):
+            found.add((folder / name).stat().st_ino)
+    return found
+
+
+def _in_use(folder: Path) -> set[int]:
+    """List the inodes of the folder's files that any process has open or mapped, as far as this user can see.
 
     A starting process opens its lock file just before it locks it, so a free lock alone does not mean a dead owner.
+    Inodes, as a semaphore's mapping carries the name that it had while it was made.
     """
     prefix = f"{folder}/"
-    found: set[str] = set()
+    found: set[int] = set()
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             for line in (process / "maps").read_text().splitlines():
-                place = line.find(prefix)
-                if place >= 0:
-                    found.add(line[place + len(prefix) :])
+                if prefix in line:
+                    found.add(int(line.split(maxsplit=5)[4]))
         with contextlib.suppress(OSError):
             for descriptor in os.listdir(process / "fd"):
                 with contextlib.suppress(OSError):
-                    target = os.readlink(process / "fd" / descriptor)
-                    if target.startswith(prefix):
-                        found.add(target[len(prefix) :])
+                    if os.readlink(process / "fd" / descriptor).startswith(prefix):
+                        found.add((process / "fd" / descriptor).stat().st_ino)
     return found

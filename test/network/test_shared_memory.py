@@ -6,12 +6,15 @@ import mmap
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from robot_formation.network.ros_domain import DomainReservation
+from robot_formation.network.port_mutex import PortMutex
+from robot_formation.network.ros_domain import DomainReservation, domain_ports
 from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, find_orphans
+from robot_formation.network.shared_memory_space import SHARED_MEMORY
 
 NODE = """
 import rclpy
@@ -80,6 +83,43 @@ def test_a_port_without_lock_file_is_removed_unless_somebody_has_it_mapped(tmp_p
     assert clean_orphans(folder=tmp_path) == [port]
 
 
+@pytest.fixture
+def unused_port() -> Iterator[tuple[int, str]]:
+    """A port of the machine's shared memory that no process has, and its domain."""
+    with DomainReservation() as domain:
+        port = f"fastrtps_port{domain_ports(domain)[-1]}"
+        yield domain, port
+        for name in fast_dds_files().get(port, []):
+            (SHARED_MEMORY / name).unlink()
+
+
+def test_a_port_that_a_process_is_opening_stays(unused_port: tuple[int, str]) -> None:
+    domain, port = unused_port
+    with PortMutex(port) as first:
+        assert first
+        make(SHARED_MEMORY, port, f"{port}_el")
+        with PortMutex(port) as second:
+            assert not second
+        clean_orphans(domain)
+        assert fast_dds_files()[port] == [port, f"{port}_el", f"sem.{port}_mutex"]
+    clean_orphans(domain)
+    assert port not in fast_dds_files()
+
+
+def test_a_port_whose_owner_was_killed_while_opening_it_is_removed(unused_port: tuple[int, str]) -> None:
+    domain, port = unused_port
+    code = f"""
+import os
+from robot_formation.network.port_mutex import PortMutex
+with PortMutex("{port}") as taken:
+    open("{SHARED_MEMORY / port}", "w").close()
+    os._exit(0 if taken else 1)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+    clean_orphans(domain)
+    assert port not in fast_dds_files()
+
+
 def test_foreign_files_stay(tmp_path: Path) -> None:
     make(tmp_path, "fastrtps_port", "fastrtps_xyz_el", "somebody_elses", "lttng")
     assert clean_orphans(folder=tmp_path) == []
@@ -107,7 +147,8 @@ def test_a_killed_node_leaves_files_that_are_removed_and_a_living_one_keeps_its_
         def start() -> subprocess.Popen[bytes]:
             node = subprocess.Popen([sys.executable, "-c", NODE], env=environment, stdout=subprocess.PIPE)
             assert node.stdout is not None
-            assert node.stdout.readline() == b"up\n"
+            while node.stdout.readline() not in (b"up\n", b""):  # ROS itself may write lines before
+                pass
             return node
 
         def files_of(node: subprocess.Popen[bytes]) -> set[str]:
