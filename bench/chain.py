@@ -94,10 +94,12 @@ def run_task(task: Task, more: Sequence[str] = ()) -> list[Row]:
     cpu_s, wall_s = time.process_time(), time.perf_counter()
     record = run_in_memory(scenario)
     cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
-    return rows_of(task, analyse(record), cpu_s, wall_s)
+    ends_ns = [[each.stamp_ns for each in follower.displacements] for follower in record.followers]
+    steps_s = [(ends[-1] - ends[0]) / 1e9 / (len(ends) - 1) if len(ends) > 1 else math.nan for ends in ends_ns]
+    return rows_of(task, analyse(record), steps_s, cpu_s, wall_s)
 
 
-def rows_of(task: Task, run: RunAnalysis, cpu_s: float, wall_s: float) -> list[Row]:
+def rows_of(task: Task, run: RunAnalysis, steps_s: list[float], cpu_s: float, wall_s: float) -> list[Row]:
     """Return a run's rows, one per follower."""
     chain = run.string_stability or {"hops": [], "gains": []}
     hops = {hop["robot"]: hop for hop in chain["hops"]}
@@ -117,6 +119,7 @@ def rows_of(task: Task, run: RunAnalysis, cpu_s: float, wall_s: float) -> list[R
             ),
             losses=len(follower.totals["losses"]),
             simulated_s=float(follower.totals["simulated_seconds"]),
+            step_s=steps_s[number - 1],
             cpu_s=cpu_s,
             wall_s=wall_s,
             **{name: follower.totals[name] for name in TOTALS},
