@@ -98,8 +98,8 @@ class HeadingCheck:
 
     Attributes:
         caught_up_rad: standard deviation of what the latest timestep's check makes good of earlier timesteps; 0 where
-            a deviation has called for it, and in follow-ups: what they find was made in that timestep, as far as
-            anybody knows.
+            a deviation has called for it, where a turn has and the check finds much else than was forecast, and in
+            follow-ups: what these find was made in that timestep, as far as anybody knows.
     """
 
     def __init__(self, parameters: HeadingCheckParameters) -> None:
@@ -109,7 +109,7 @@ class HeadingCheck:
         self._scatter = _Scatter()
         self._patience = 1.0
         self._follow_ups = 0
-        self._beside = self._follow_up = False  # what called for the latest check
+        self._beside = self._turned = self._follow_up = False  # what called for the latest check
         self.caught_up_rad = 0.0
 
     def stepped(self, turn_rad: float) -> None:
@@ -129,21 +129,24 @@ class HeadingCheck:
         self._beside_sigmas *= _MEMORY
         if deviation is not None:
             self._beside_sigmas += self._scatter.in_sigmas(deviation)
-        self._beside, self._follow_up = False, self._follow_ups > 0
+        self._beside = self._turned = False
+        self._follow_up = self._follow_ups > 0
         if self._follow_up:
             self._follow_ups -= 1
             return True
         beside = abs(self._beside_sigmas) / (self._patience * p.beside_sigmas)
         turned = abs(self._turned_rad) / p.turned_rad
         self._beside = beside > 1.0
-        return max(beside, turned) > 1.0 or min(beside, turned) > _HALFWAY or sigma_rad > p.sigma_rad
+        self._turned = turned > 1.0 or min(beside, turned) > _HALFWAY
+        return self._beside or self._turned or sigma_rad > p.sigma_rad
 
     def done(self, change_rad: float) -> None:
         """Process a check: how far from where it was expected the heading was found."""
         self._turned_rad = self._beside_sigmas = 0.0
         if self._follow_up:
             return
-        if not self._beside and abs(change_rad) < _UNEXPECTED_RAD:
+        unexpected = self._turned and abs(change_rad) >= _UNEXPECTED_RAD
+        if not (self._beside or unexpected):
             self.caught_up_rad = _CAUGHT_UP * abs(change_rad)
         elif abs(change_rad) > _FOUND_RAD:
             self._patience, self._follow_ups = 1.0, _FOLLOW_UPS

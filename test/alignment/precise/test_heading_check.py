@@ -167,6 +167,16 @@ def test_nothing_is_caught_up_after_a_turn_that_nothing_foretold() -> None:
     assert check.caught_up_rad == 0.0
 
 
+def test_much_that_is_found_where_the_heading_was_hardly_known_is_caught_up() -> None:
+    check = HeadingCheck(P)
+    check.stepped(0.0)
+    assert check.due(by_forecast(0.0), 1.01 * P.sigma_rad)
+    check.done(0.2)
+    assert check.caught_up_rad == pytest.approx(0.1)
+    check.stepped(0.0)
+    assert not check.due(by_forecast(0.0), KNOWN_RAD)
+
+
 def test_a_heading_that_is_hardly_known_is_checked() -> None:
     check = HeadingCheck(P)
     check.stepped(0.0)
