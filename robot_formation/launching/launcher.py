@@ -158,7 +158,10 @@ class Launcher:
                 interrupted = bool(self._signals.count)
                 return (exit_codes.INTERRUPTED, "interrupted") if interrupted else (exit_codes.NODE_DIED, str(error))
             stand_ins = self._wait_for(elsewhere, folder, environment)
-            return self._follow(monitor, progress, stand_ins, announcement, began, result)
+            code, reason = self._follow(monitor, progress, stand_ins, announcement, began, result)
+            if code == exit_codes.DONE:
+                stand_ins.run_done()
+            return code, reason
 
     def _follow(
         self,
@@ -182,7 +185,7 @@ class Launcher:
             ended = self._first_ended()
             if ended is not None:
                 monitor.drain(_POLL_S, lambda: progress.complete)
-                return self._ended_by(ended, monitor, stand_ins)
+                return self._ended_by(ended, monitor)
             reason = self._look(stand_ins, watchdog, monitor)
             if self._tour_ended(progress, monitor, gone=bool(reason)):
                 return exit_codes.DONE, ""
@@ -210,15 +213,12 @@ class Launcher:
                 return child
         return None
 
-    def _ended_by(self, ended: Child, monitor: Monitor, stand_ins: StandIns) -> tuple[int, str]:
+    def _ended_by(self, ended: Child, monitor: Monitor) -> tuple[int, str]:
         """Judge a node's end, which ends the run, by the others' states; then let those that are stopped go on."""
         try:
-            code, reason = self._verdict(ended)
+            return self._verdict(ended)
         finally:
             self._resume(monitor)
-        if code == exit_codes.DONE:
-            stand_ins.run_done()
-        return code, reason
 
     def _wait_for(self, elsewhere: list[Process], folder: Path, environment: dict[str, str]) -> StandIns:
         """Tell how to start the nodes that somebody else starts, and begin to wait for them."""

@@ -13,6 +13,7 @@ import fcntl
 import os
 import re
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from robot_formation.network.port_mutex import PortMutex
@@ -20,9 +21,9 @@ from robot_formation.network.ros_domain import FIRST_PORT, domain_ports
 from robot_formation.network.shared_memory_space import SHARED_MEMORY
 
 _NAME = re.compile(r"(?:sem\.)?(?P<group>fastrtps_(?:[0-9a-f]{16}|port(?P<port>\d+)))(?P<part>_el|_sl|_mutex)?")
-
-
 _ROUNDS, _ROUND_S = 6, 0.05
+_MUTEX_LOOKS, _MUTEX_LOOK_S = 3, 0.02
+"""A living process has a port's mutex for milliseconds."""
 
 
 class TracingFiles:
@@ -55,16 +56,24 @@ def fast_dds_files(folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
 
 
 def find_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
-    """List the groups of files whose owners are all dead; removes nothing. Arguments as for clean_orphans."""
+    """List the groups of files whose owners are all dead; removes nothing. Arguments as for clean_orphans.
+
+    Processes of other containers that share the folder are not seen here; their locks are, while files are removed.
+    """
     groups = {group: names for group, names in fast_dds_files(folder).items() if _is_of_domain(group, domain)}
     if not groups:
         return {}
-    in_use = _in_use(folder) | _locked()
-    return {group: names for group, names in groups.items() if in_use.isdisjoint(_inodes(folder, names))}
+    use = _Use(folder)
+    return {group: names for group, names in groups.items() if use.lacks(names)}
 
 
 def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> list[str]:
     """Remove the files whose owners are dead, and never a living process' files.
+
+    A port is removed under its mutex, so that it is not half open: a process that had just opened a dead one's port
+    would lose the port's file and lock the new lock file, and all processes started later would find this port broken.
+    The mutex is kept for as short as can be, for its file is removed too: who waits for the former one is not kept from
+    who makes a new one. Segments are opened by one process, and have no mutex.
 
     Args:
         domain: Leave the ports of other domains alone. Segments, and the ports below 7400, carry no domain in their
@@ -76,33 +85,46 @@ def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> li
     """
     removed: list[str] = []
     for group in find_orphans(domain, folder):
-        if folder != SHARED_MEMORY or "port" not in group:  # segments are opened by one process, and have no mutex
+        if folder != SHARED_MEMORY or "port" not in group:
             removed += _remove_unlocked(group, folder)
             continue
-        with contextlib.suppress(OSError):
-            with PortMutex(group) as taken:
-                if taken:
-                    removed += _remove_unlocked(group, folder)
-            if not taken and _in_use(folder).isdisjoint(_inodes(folder, [f"sem.{group}_mutex"])):
-                removed += _remove_unlocked(group, folder)  # its owner was killed while it had the mutex
+        with contextlib.suppress(OSError), _taken(group):
+            removed += _remove_unlocked(group, folder)
     return removed
 
 
+@contextlib.contextmanager
+def _taken(port: str) -> Iterator[None]:
+    """Keep a port's mutex; that of an owner who was killed while it had the mutex is void.
+
+    Raises:
+        OSError: if a living process has the mutex, or it can't be opened.
+    """
+    with contextlib.ExitStack() as stack:
+        for _ in range(_MUTEX_LOOKS):
+            if stack.enter_context(PortMutex(port)):
+                break
+            stack.close()
+            time.sleep(_MUTEX_LOOK_S)
+        else:
+            if not _Use(SHARED_MEMORY).lacks([f"sem.{port}_mutex"]):
+                raise BlockingIOError(f"{port} is being opened")
+        yield
+
+
 def clean_after_graph(domain: int) -> None:
-    """Remove what dead processes left, this domain's in rounds: Fast DDS lets go of the last files in its own time."""
+    """Remove what dead processes left, in rounds: Fast DDS lets go of this domain's last files in its own time."""
+    clean_orphans()
     for _ in range(_ROUNDS):
-        clean_orphans()
-        if not any(_is_of_domain(group, domain) for group in fast_dds_files()):
+        ports = {f"fastrtps_port{port}" for port in domain_ports(domain)}
+        if ports.isdisjoint(fast_dds_files()):
             return
         time.sleep(_ROUND_S)
+        clean_orphans(domain)
 
 
 def _remove_unlocked(group: str, folder: Path) -> list[str]:
-    """Remove a group's files as they are now, unless one is locked; returns the names of those removed.
-
-    Under the port's mutex none is half open. Without the mutex a process that had just opened a dead one's port lost
-    the port's file, locked the new lock file, and every process started afterwards found this port broken.
-    """
+    """Remove a group's files as they are now, unless one is locked; returns the names of those removed."""
     names = fast_dds_files(folder).get(group, [])
     held = _lock_all(folder, names)
     if held is None:
@@ -123,16 +145,6 @@ def _is_of_domain(group: str, domain: int | None) -> bool:
         return True
     port = int(match["port"])
     return port < FIRST_PORT or port in domain_ports(domain)
-
-
-def _locked() -> set[int]:
-    """List the inodes of locked files. To try their locks would make those fail who want them at that moment."""
-    found = set()
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/locks").read_text().splitlines():
-            place = next(word for word in line.split() if word.count(":") == 2)  # major:minor:inode
-            found.add(int(place.rpartition(":")[2]))
-    return found
 
 
 def _lock_all(folder: Path, names: list[str]) -> list[int] | None:
@@ -159,30 +171,57 @@ def _unlock(descriptors: list[int]) -> None:
         os.close(descriptor)
 
 
-def _inodes(folder: Path, names: list[str]) -> set[int]:
-    found = set()
-    for name in names:
-        with contextlib.suppress(OSError):
-            found.add((folder / name).stat().st_ino)
-    return found
+class _Use:
+    """Which of the folder's files any process has open, mapped or locked now, as far as this user can see.
 
-
-def _in_use(folder: Path) -> set[int]:
-    """List the inodes of the folder's files that any process has open or mapped, as far as this user can see.
-
-    A starting process opens its lock file just before it locks it, so a free lock alone does not mean a dead owner.
-    Inodes, as a semaphore's mapping carries the name that it had while it was made.
+    A starting process opens its lock file just before it locks it, so a free lock alone does not mean a dead owner. To
+    try locks would make those fail who want them at that moment.
     """
-    prefix = f"{folder}/"
-    found: set[int] = set()
-    for process in Path("/proc").glob("[0-9]*"):
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._prefix = f"{folder}/"
+        self._names: set[str] = set()
+        self._places: set[str] = set()  # device and inode, where names don't tell
+        self._read_locks()
+        for process in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                self._read_maps(process)
+            with contextlib.suppress(OSError):
+                for descriptor in os.listdir(process / "fd"):
+                    with contextlib.suppress(OSError):
+                        self._add(os.readlink(process / "fd" / descriptor))
+
+    def lacks(self, names: list[str]) -> bool:
+        """Return whether these files are there, and nobody uses any of them."""
+        try:
+            places = {self._place(name) for name in names}
+        except OSError:  # its owner is ending in good order
+            return False
+        return bool(names) and self._names.isdisjoint(names) and self._places.isdisjoint(places)
+
+    def _place(self, name: str) -> str:
+        status = (self._folder / name).stat()
+        return f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}:{status.st_ino}"
+
+    def _add(self, path: str) -> None:
+        if path.startswith(self._prefix):
+            self._names.add(path.removeprefix(self._prefix))
+
+    def _read_locks(self) -> None:
         with contextlib.suppress(OSError):
-            for line in (process / "maps").read_text().splitlines():
-                if prefix in line:
-                    found.add(int(line.split(maxsplit=5)[4]))
-        with contextlib.suppress(OSError):
-            for descriptor in os.listdir(process / "fd"):
-                with contextlib.suppress(OSError):
-                    if os.readlink(process / "fd" / descriptor).startswith(prefix):
-                        found.add((process / "fd" / descriptor).stat().st_ino)
-    return found
+            for line in Path("/proc/locks").read_text().splitlines():
+                self._places.update(word for word in line.split() if word.count(":") == 2)
+
+    def _read_maps(self, process: Path) -> None:
+        own = process.name == str(os.getpid())
+        for line in (process / "maps").read_text(errors="replace").splitlines():
+            place = line.find(self._prefix)
+            if place < 0:
+                continue
+            if not line.startswith("sem.", place + len(self._prefix)):
+                self._add(line[place:])
+            elif not own:  # this process takes mutexes only here
+                # The mapping's name may be the one that the file had while it was made.
+                device, inode = line.split(maxsplit=5)[3:5]
+                self._places.add(f"{device}:{inode}")

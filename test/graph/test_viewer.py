@@ -49,7 +49,8 @@ class Watcher(threading.Thread):
         browser.until(f"{TEXT}.includes('the run is paused')")
         self.seen.append(browser.value(SIMULATED))
         browser.until(click("one step (50 ms)"))
-        browser.until(f"{TEXT}.includes('paused: ')")  # how far it has come, or that nothing is owed
+        # A step was made, or none was due.
+        browser.until(f"/paused: ([0-9.]+ s|.* have to order|nothing is owed)/.test({TEXT})")
         browser.until("[...document.querySelectorAll('canvas')].some(each => each.width > 200)")
         browser.until(click("go on"))
         # A browser that draws slowly may see the run's end before it has seen it go on; the run takes 100 s and more.

@@ -36,7 +36,7 @@ def test_nodes_that_are_stopped_go_on_before_a_refusal_ends_the_run() -> None:
     stopped.state, stopped.signal = "T", signals.append
     launcher._children = [refused, stopped]
     with pytest.raises(RunError, match="/drive: no such parameter"):
-        launcher._ended_by(refused, None, None)  # type: ignore[arg-type]
+        launcher._ended_by(refused, None)  # type: ignore[arg-type]
     assert signals == [signal.SIGCONT]
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_formation.network.port_mutex import PortMutex
+from robot_formation.network import shared_memory
 from robot_formation.network.ros_domain import DomainReservation, domain_ports
 from robot_formation.network.shared_memory import clean_orphans, fast_dds_files, find_orphans
 from robot_formation.network.shared_memory_space import SHARED_MEMORY
@@ -93,17 +93,38 @@ def unused_port() -> Iterator[tuple[int, str]]:
             (SHARED_MEMORY / name).unlink()
 
 
-def test_a_port_that_a_process_is_opening_stays(unused_port: tuple[int, str]) -> None:
+OPENING = """
+import pathlib, sys
+from robot_formation.network.port_mutex import PortMutex
+with PortMutex("{port}") as taken:
+    assert taken
+    for name in ("{port}", "{port}_el"):
+        pathlib.Path("{folder}", name).touch()
+    print("opening", flush=True)
+    sys.stdin.readline()
+"""
+
+
+def test_a_port_that_a_process_is_opening_stays(unused_port: tuple[int, str], monkeypatch: pytest.MonkeyPatch) -> None:
     domain, port = unused_port
-    with PortMutex(port) as first:
-        assert first
-        make(SHARED_MEMORY, port, f"{port}_el")
-        with PortMutex(port) as second:
-            assert not second
-        clean_orphans(domain)
-        assert fast_dds_files()[port] == [port, f"{port}_el", f"sem.{port}_mutex"]
+    code = OPENING.format(port=port, folder=SHARED_MEMORY)
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "opening\n"
+        names = [port, f"{port}_el", f"sem.{port}_mutex"]
+        assert fast_dds_files()[port] == names
+        with monkeypatch.context() as patch:  # it began just after its files had been looked at
+            patch.setattr(shared_memory, "find_orphans", lambda *_: {port: names})
+            assert clean_orphans(domain) == []
+        process.communicate("go on\n")
     clean_orphans(domain)
     assert port not in fast_dds_files()
+
+
+def test_files_that_vanish_meanwhile_are_no_orphans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_memory, "fast_dds_files", lambda _: {SEGMENT: [SEGMENT, f"{SEGMENT}_el"]})
+    assert find_orphans(folder=tmp_path) == {}
 
 
 def test_a_port_whose_owner_was_killed_while_opening_it_is_removed(unused_port: tuple[int, str]) -> None:
@@ -147,8 +168,8 @@ def test_a_killed_node_leaves_files_that_are_removed_and_a_living_one_keeps_its_
         def start() -> subprocess.Popen[bytes]:
             node = subprocess.Popen([sys.executable, "-c", NODE], env=environment, stdout=subprocess.PIPE)
             assert node.stdout is not None
-            while node.stdout.readline() not in (b"up\n", b""):  # ROS itself may write lines before
-                pass
+            while (line := node.stdout.readline()) != b"up\n":  # ROS itself may write lines before
+                assert line
             return node
 
         def files_of(node: subprocess.Popen[bytes]) -> set[str]:

@@ -235,7 +235,7 @@ class Host:
             self._publish_health()
         finally:
             end = time.monotonic() + _ACKNOWLEDGED_S  # a listener that was killed never acknowledges
-            for publisher in self._publishers.values():
+            for publisher in (*self._publishers.values(), self._health):
                 publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
             executor.shutdown()
             component.close()

@@ -175,7 +175,8 @@ class RecorderNode:
         self._ignored: set[str] = set()
         self._refused: set[tuple[int, ...]] = set()
         self._told_dropped = 0
-        self._messages = 0
+        self._messages = 0  # of those that are recorded
+        self._arrived = 0
         self._chunk_at = time.monotonic()
         self._tick_at: float | None = None
         self._snapshot = ParameterSnapshot(node, self._keep) if ask else None
@@ -231,9 +232,9 @@ class RecorderNode:
         quiet = 0
         # Rounds are counted, not time: on a busy machine this process may not run for longer than any silence.
         while quiet < _QUIET_ROUNDS and time.monotonic() < end:
-            before = self._messages
+            before = self._arrived
             executor.spin_once(_ROUND_S)
-            quiet = 0 if self._messages != before else quiet + 1
+            quiet = 0 if self._arrived != before else quiet + 1
 
     def _discover(self) -> None:
         for name, types in self._node.get_topic_names_and_types():
@@ -273,6 +274,7 @@ class RecorderNode:
         self._say(f"recording {name} ({type_name})")
 
     def _on_message(self, topic: str, type_name: str, data: bytes) -> None:
+        self._arrived += 1
         if self._health.is_own(topic, data) or self._is_of_others(topic, data):
             return
         self._messages += 1
