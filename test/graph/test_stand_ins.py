@@ -90,10 +90,18 @@ def test_the_examples_own_tests_pass(with_example: dict[str, str]) -> None:
 def test_the_packages_own_nodes_started_by_hand_give_the_same_run(tmp_path: Path) -> None:
     scenario = short_scenario("followers=2", "leader.timesteps=2", track="one")
     left_out = ("world", "follower_2/block_detector", "leader/leader")
+    said: list[str] = []
     with starter() as others:
-        result = launch(scenario, tmp_path / "by_hand", say=others.say, stand_ins=left_out)
+
+        def say(text: str) -> None:
+            said.append(text)
+            others.say(text)
+
+        result = launch(scenario, tmp_path / "by_hand", say=say, stand_ins=left_out)
     assert (result.exit_code, result.reason) == (0, "")
     assert set(others.started) == {f"/{node}" for node in left_out}
+    for node in left_out:
+        assert sum(text.startswith((f"/{node} is there", f"/{node} was there")) for text in said) == 1
     assert launch(scenario, tmp_path / "all").exit_code == 0
     for follower in range(2):
         one, other = (displacements(tmp_path / bag, follower) for bag in ("by_hand", "all"))
