@@ -51,6 +51,21 @@ def test_drives_that_are_measured_without_error_can_be_learnt_from_again_and_aga
     assert actuation.slip == pytest.approx(0.03)
 
 
+@pytest.mark.parametrize("aside_m", [0.0, 0.01, 0.019])
+def test_after_thousands_of_drives_the_slip_is_still_learned(aside_m: float) -> None:
+    model = ActuationModel(ActuationParameters())
+    rng = np.random.default_rng(5)
+    for number in range(3000):
+        slip = 0.03 if number < 2900 else -0.02
+        left_m = aside_m * math.sin(number * math.pi / 6)
+        driven_m = left_m if abs(left_m) > ActuationParameters.least_leg_m else 0.0
+        beside_m = driven_m + slip * 0.05 + rng.normal(scale=2e-4)
+        model.moved(Motion(0.05, left_m, 0.0), Motion(0.05, beside_m, 0.0))
+    assert model.slip == pytest.approx(-0.02, abs=0.005)
+    assert np.array_equal(model._covariance, model._covariance.T)
+    assert np.linalg.eigvalsh(model._covariance).min() > 0.0
+
+
 def test_slip_and_overshoot_are_those_of_the_direction_after_the_turn() -> None:
     actuation, turn = ActuationModel(P), 0.4
     for _ in range(8):
