@@ -67,7 +67,7 @@ class AwaitedRobots:
         self._period = 0
         self._finished = {0: 0}
         self._robots[self._leader].begun = 0  # it has nothing to do in the first alignment
-        if schedule is Schedule.TIMER:
+        if schedule.at_once:
             self._allow(self._names, 0)
         elif schedule is not Schedule.TURNS:
             self._allow(self._names[1:2], 0)
@@ -89,7 +89,7 @@ class AwaitedRobots:
         if not robot.active:
             robot.active = True
             robot.begun += 1
-            if self._schedule is Schedule.TOGETHER and robot.begun > 0:
+            if self._schedule is Schedule.TOGETHER:
                 self._allow(self._names, robot.begun)  # its tick may come later than its order
 
     def rests(self, name: str) -> None:

@@ -58,7 +58,7 @@ class FineTunerComponent(Component):
         self._done = names.formation_done(place.robot, place.formation, listeners=listeners)
         following = ("world",) if self._last else ("fine_tuner", "world")
         self._begun = names.formation_begun(place.robot, place.formation, listeners=following)
-        self._told_begun, self._passed_on = 0, -1
+        self._told_begun = self._passed_on = -1
         self._finished = -1
         self._base = place.frame(names.BASE_FRAME)
         watching = () if self._schedule is Schedule.TURNS else ("world",)
@@ -112,7 +112,7 @@ class FineTunerComponent(Component):
 
     @property
     def _begins(self) -> int:
-        """The latest timestep after the first alignment that has begun; 0: none."""
+        """The latest timestep that has begun; 0 is the first alignment, -1: none."""
         return self._tuner.timestep - (self._tuner.phase is core.Phase.NEIGHBOUR)
 
     def stalled(self) -> None:
@@ -175,8 +175,6 @@ class FineTunerComponent(Component):
             self._send(self._done, conversions.uint32(timestep))
         else:
             self._send(names.camera_request(), conversions.uint32(0))  # the world need not wait any more
-        if self._schedule is Schedule.TOGETHER and timestep == 0:
-            self._send(self._begun, conversions.uint32(0))  # the first alignment goes along the chain
         self._pass_on()
 
     def _pass_on(self) -> None:

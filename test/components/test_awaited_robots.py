@@ -125,8 +125,12 @@ def test_a_lost_robot_is_not_awaited_and_the_run_is_stuck_once_the_others_have_n
     schedule: Schedule,
 ) -> None:
     awaited = AwaitedRobots(schedule, ROBOTS, 5, 1.0)
-    awaited.ordered("follower_1", frames=True)
-    awaited.looked("follower_1")
+    aligned = [] if schedule is Schedule.WAVE else ROBOTS[2:]  # at the same time as the one that is lost
+    for robot in ("follower_1", *aligned):
+        awaited.ordered(robot, frames=True)
+        awaited.looked(robot)
+    for robot in aligned:
+        awaited.idle(robot)
     assert not awaited.stuck
     awaited.give_up("follower_1")
     assert awaited.names() == []
@@ -150,6 +154,11 @@ def test_others_finish_what_they_have_begun_before_the_run_is_stuck() -> None:
     assert not awaited.stuck
     awaited.idle("follower_2")
     assert awaited.stuck
+
+
+def test_all_align_at_the_same_time_in_together_and_along_the_chain_in_wave() -> None:
+    assert AwaitedRobots(Schedule.TOGETHER, ROBOTS, 5, 1.0).names() == list(ROBOTS[1:])
+    assert AwaitedRobots(Schedule.WAVE, ROBOTS, 5, 1.0).names() == [ROBOTS[1]]
 
 
 @pytest.mark.parametrize("schedule", [Schedule.TURNS, Schedule.TIMER])
