@@ -88,6 +88,17 @@ def test_delayed_places_lag_by_a_step_per_robot() -> None:
     assert np.allclose(np.diff(ends), -0.05, atol=0.02)
 
 
+def test_steps_aside_are_not_taken_for_turns_where_nobody_checks_headings() -> None:
+    """In this run follower 2 turned away by 9 degrees until timestep 11, and by 24 until timestep 16."""
+    found = analysed(
+        *("schedule=timer", "spacing=delayed", "leader.path=slalom", "leader.path_parameters=[step_m=0.03, period=20]"),
+        *("world.surface_parameters=[size_m=6.0, curvature_per_m=0.02]", "start_x_m=1.4", "start_y_m=1.5"),
+        *("leader.timesteps=11", "seed=6"),
+    )
+    headings = [timestep.heading_error_rad for timestep in found.followers[1].timesteps]
+    assert max(abs(heading) for heading in headings if heading is not None) < np.radians(4.0)
+
+
 @pytest.mark.parametrize("settings", [("schedule=turns",), ("schedule=timer", "spacing=delayed")])
 def test_a_formation_closes_up_while_its_leader_stands(settings: tuple[str, ...]) -> None:
     """Steps of no length are timesteps like others; who lags behind arrives meanwhile."""
