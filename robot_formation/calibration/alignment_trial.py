@@ -11,16 +11,9 @@ from robot_formation import names
 from robot_formation.alignment.precise.motion_planner import count_legs
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.drive.movement_system import Drive, DriveParameters
+from robot_formation.follower.actions import Action, Done, Lost, RequestFrames, SendMove
 from robot_formation.follower.alignment_state import AlignmentState, State
-from robot_formation.follower.fine_tuning import (
-    Action,
-    Done,
-    FineTuner,
-    FineTunerParameters,
-    Lost,
-    RequestFrames,
-    SendMove,
-)
+from robot_formation.follower.fine_tuning import FineTuner, FineTunerParameters
 from robot_formation.geometry.footprint import footprint_gap_m
 from robot_formation.geometry.se2 import Motion, formation_error_uv_m
 from robot_formation.surface import Surface

@@ -9,9 +9,10 @@ from functools import partial
 from robot_formation import conversions, exit_codes, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.node_parameters import FineTunerNodeParameters
-from robot_formation.follower import fine_tuning as core
+from robot_formation.follower.actions import Action, Done, Lost, Report, RequestFrames, SendMove, Warn
 from robot_formation.follower.alignment_state import State
 from robot_formation.follower.camera_calibration_file import calibrated
+from robot_formation.follower.fine_tuning import FineTuner, Phase
 from robot_formation.geometry.se2 import Motion
 from robot_formation.geometry.uncertain_motion import EXACT, UncertainMotion
 from robot_formation.names import Message
@@ -51,7 +52,7 @@ class FineTunerComponent(Component):
             period_s=parameters.period_s,
             timesteps=parameters.timesteps,
         )
-        self._tuner = core.FineTuner(calibrated(parameters), self._rule)
+        self._tuner = FineTuner(calibrated(parameters), self._rule)
         self.patience_s = parameters.look.patience_s
         self._timesteps = parameters.timesteps
         listeners = done_listeners(parameters.schedule, parameters.done_listeners, first=self._left == names.LEADER)
@@ -113,7 +114,7 @@ class FineTunerComponent(Component):
     @property
     def _begins(self) -> int:
         """The latest timestep that has begun; 0 is the first alignment, -1: none."""
-        return self._tuner.timestep - (self._tuner.phase is core.Phase.NEIGHBOUR)
+        return self._tuner.timestep - (self._tuner.phase is Phase.NEIGHBOUR)
 
     def stalled(self) -> None:
         """See `Component`: frames that don't come are asked for again, up to a bound."""
@@ -192,26 +193,26 @@ class FineTunerComponent(Component):
         self._passed_on = behind
         self._send(self._done, conversions.uint32(behind))
 
-    def _act(self, actions: Sequence[core.Action]) -> None:
+    def _act(self, actions: Sequence[Action]) -> None:
         self.stamp_ns = self._tuner.stamp_ns
         if self._schedule is Schedule.TOGETHER and self._begins > self._told_begun:
             self._told_begun = self._begins
             self._send(self._begun, conversions.uint32(self._begins))
         for action in actions:
             match action:
-                case core.SendMove(motion):
+                case SendMove(motion):
                     self._send(names.MOVE, conversions.move(motion, self._base, self.stamp_ns))
-                case core.RequestFrames(count):
+                case RequestFrames(count):
                     self._send(names.camera_request(), conversions.uint32(count))
-                case core.Report():
+                case Report():
                     self._report(action)
-                case core.Done(timestep):
+                case Done(timestep):
                     self._finish(timestep)
                 case State():
                     self._send(self._alignment, conversions.string(action.text))
-                case core.Warn(text):
+                case Warn(text):
                     self.warn(text)
-                case core.Lost(reason):
+                case Lost(reason):
                     self._lose(reason)
 
     def _lose(self, reason: str) -> None:
@@ -222,7 +223,7 @@ class FineTunerComponent(Component):
         else:
             self.hold(exit_codes.LOST, text)
 
-    def _report(self, report: core.Report) -> None:
+    def _report(self, report: Report) -> None:
         # The predictor waits for the pair, so what it may use beside them goes first.
         for topic, motion in (
             (names.COMMANDED, None if report.commanded is None else UncertainMotion(report.commanded)),

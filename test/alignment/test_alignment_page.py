@@ -11,7 +11,8 @@ import pytest
 from alignment_helpers import blocks_of, state_of
 from repository import ROOT
 from robot_formation.alignment.mode import Verdict
-from robot_formation.follower.fine_tuning import Action, FineTuner, FineTunerParameters, Phase, RequestFrames, SendMove
+from robot_formation.follower.actions import Action, RequestFrames, SendMove
+from robot_formation.follower.fine_tuning import FineTuner, FineTunerParameters, Phase
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 

@@ -10,16 +10,10 @@ import pytest
 
 from alignment_helpers import blocks_of, state_of
 from robot_formation.alignment.precise.motion_planner import PlannerParameters
+from robot_formation.follower.actions import Done, Report, RequestFrames, SendMove
 from robot_formation.follower.alignment_state import AlignmentState, State
 from robot_formation.follower.blind_driving import blind_timesteps, out_of_view
-from robot_formation.follower.fine_tuning import (
-    Done,
-    FineTuner,
-    FineTunerParameters,
-    Report,
-    RequestFrames,
-    SendMove,
-)
+from robot_formation.follower.fine_tuning import FineTuner, FineTunerParameters
 from robot_formation.geometry.se2 import Motion
 from robot_formation.geometry.slots import slot
 from robot_formation.geometry.uncertain_motion import TURN_UNKNOWN, UncertainMotion

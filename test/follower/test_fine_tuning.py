@@ -9,18 +9,9 @@ from typing import Any
 import pytest
 
 from robot_formation.alignment.paper_mode import PaperAlignment
+from robot_formation.follower.actions import Done, Lost, Report, RequestFrames, SendMove, Warn
 from robot_formation.follower.alignment_state import AlignmentState, State
-from robot_formation.follower.fine_tuning import (
-    Done,
-    FineTuner,
-    FineTunerParameters,
-    Lost,
-    Phase,
-    Report,
-    RequestFrames,
-    SendMove,
-    Warn,
-)
+from robot_formation.follower.fine_tuning import FineTuner, FineTunerParameters, Phase
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
 from robot_formation.vision.marker import Face

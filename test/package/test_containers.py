@@ -77,7 +77,7 @@ def test_the_development_container_is_the_image_without_the_package() -> None:
 def test_pre_commit_runs_the_linters_of_the_tests() -> None:
     (repo,) = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
     assert repo["repo"] == "local"
-    (marker,) = (mark for mark in test_linters.test_linter_is_content.pytestmark if mark.name == "parametrize")  # type: ignore[attr-defined]
+    (marker,) = (mark for mark in test_linters.test_linter_finds_nothing.pytestmark if mark.name == "parametrize")  # type: ignore[attr-defined]
     tested = [" ".join(word for word in command if word != "--check") for command in marker.args[1]]
     assert [hook["entry"] for hook in repo["hooks"]] == [f".venv/bin/python -m {command}" for command in tested]
     assert all(hook["language"] == "system" for hook in repo["hooks"]), "others are fetched from the network"
