@@ -59,7 +59,7 @@ PATHS: dict[str, tuple[str, ...]] = {
 }
 """The path's name, then its parameters."""
 CHAIN_PATHS = ("straight", "slalom", "speed_step", "stop", "chirp")
-SCHEDULES = ("turns", "wave", "together", "timer", "timer+delayed")
+SCHEDULES = ("turns", "wave", "together", "together+delayed", "timer", "timer+delayed")
 
 
 def timesteps(task: Task) -> int:

@@ -263,6 +263,7 @@ STYLE = {
     "together": ("#E69F00", "^"),
     "timer": ("#D55E00", "v"),
     "timer+delayed": ("#0072B2", "D"),
+    "together+delayed": ("#CC79A7", "P"),
 }
 """Colour and marker of each schedule and spacing, colours of Okabe and Ito."""
 
