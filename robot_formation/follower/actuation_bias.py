@@ -1,47 +1,63 @@
-"""How far prediction moves end beside what was commanded: what the next one to a delayed place is asked for less.
+"""How far prediction moves usually end beside what was commanded: to be taken off the next commands.
 
-Drives ahead coast, downhill farther, and slip aside: some 3 mm on a step of 3 to 5 cm. A follower of a delayed place
-drives what it sees to be left, so that a move that is too long by a share e makes the transfer from its neighbour's
-displacements to its own T(z) = (1 + e) / (z + e). Its gain at a period of two timesteps is (1 + e) / (1 - e), 1.2 for
-e = 0.1: a change of step would grow along the chain, with every other robot doing too much and then too little.
+A robot coasts some 3 mm on, however long the move is, and slips aside. A follower of a delayed place drives what it saw
+to be left, without a correction afterwards: uncompensated, it would stand that much beside its place all the time.
+
+Two other parts know errors of drives. `alignment.precise.actuation_model` serves corrections and the pose filter; the
+predictor's actuation bias serves residual feedback with rigid places, where the predictor chooses the command.
 """
 
 from __future__ import annotations
 
 import math
 
-from robot_formation.geometry.se2 import Motion
+from robot_formation.geometry.se2 import Motion, into_frame
 
 # Chosen.
 _LEAST_GAIN = 0.25
-"""Weight of the latest move in the mean, once there are four."""
+"""Weight of the latest move in the mean, from the third on; the first counts a half and the second a third, since the
+mean begins with a sample of zero."""
 _LEAST_WAY_M = 0.02
 """A shorter move teaches nothing, and is commanded as it is: legs of millimetres end short."""
+_MOST_ERROR_M = 0.01
+"""A move that ends farther beside its command was braked, refused or pushed."""
+
+
+class _Mean:
+    """Running mean of errors along v and to the left [m], forgetting old ones."""
+
+    def __init__(self) -> None:
+        self.ahead_m = self.left_m = 0.0
+        self._samples = 1
+
+    def add(self, ahead_m: float, left_m: float) -> None:
+        self._samples += 1
+        gain = max(1.0 / self._samples, _LEAST_GAIN)
+        self.ahead_m += gain * (ahead_m - self.ahead_m)
+        self.left_m += gain * (left_m - self.left_m)
 
 
 class ActuationBias:
-    """Mean of measured less commanded displacement, along v and u."""
+    """Mean errors of moves; those of moves backwards apart, where the robot coasts the other way."""
 
     def __init__(self) -> None:
-        """Know of no move: its bias counts as zero, like one move."""
-        self._ahead_m = self._left_m = 0.0
-        self._moves = 1
+        """Know of no move: all biases are zero."""
+        self._ahead, self._back = _Mean(), _Mean()
 
     def learn(self, commanded: Motion, error: Motion) -> None:
-        """Process a prediction move that ended `error` beside what was commanded."""
-        if not _long(commanded):
+        """Process a move that ended `error` (measured less commanded, in the frame of its start) beside its command."""
+        turn, forward, left = commanded.legs
+        if math.hypot(forward, left) < _LEAST_WAY_M or math.hypot(error.x_m, error.y_m) > _MOST_ERROR_M:
             return
-        self._moves += 1
-        gain = max(1.0 / self._moves, _LEAST_GAIN)
-        self._ahead_m += gain * (error.x_m - self._ahead_m)
-        self._left_m += gain * (error.y_m - self._left_m)
+        self._mean(forward).add(*into_frame(error.x_m, error.y_m, turn))
 
-    def taken_off(self, wish: Motion) -> Motion:
-        """Return what to command for this displacement to come about."""
-        if not _long(wish):
-            return wish
-        return Motion(wish.x_m - self._ahead_m, wish.y_m - self._left_m, wish.yaw_rad)
+    def compensated(self, desired: Motion) -> Motion:
+        """Return what to command so that the desired displacement comes about."""
+        turn, forward, left = desired.legs
+        if math.hypot(forward, left) < _LEAST_WAY_M:
+            return desired
+        mean = self._mean(forward)
+        return Motion.from_legs(turn, forward - mean.ahead_m, left - mean.left_m)
 
-
-def _long(motion: Motion) -> bool:
-    return math.hypot(motion.x_m, motion.y_m) >= _LEAST_WAY_M
+    def _mean(self, forward_m: float) -> _Mean:
+        return self._back if forward_m < -_MOST_ERROR_M else self._ahead

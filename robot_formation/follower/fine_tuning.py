@@ -323,7 +323,7 @@ class FineTuner:
 
     def _planned(self) -> Motion:
         if self.rule.delayed:  # the place where it was seen last
-            return Motion() if self.timestep == 1 or self._left is None else self._bias.taken_off(self._left)
+            return Motion() if self.timestep == 1 or self._left is None else self._bias.compensated(self._left)
         if self.timestep == 1:
             return self._first_step
         if self.timestep <= COLLECTION_TIMESTEPS or self._prediction is None:
