@@ -18,15 +18,16 @@ _BEFORE_LIGHT_BOARD = {"precise.edges.target_bottom_px": -1.8}
 `bench/marker_edges.py --board` does. Uncorrected, followers stand 6 mm too near."""
 _LEAST_LIGHT = 180
 """Least colour component of such a board."""
+_HEADING_CHECK = "precise.heading_check."
 _NO_HEADING_CHECKS = {
-    "precise.heading_check.turned_rad": 1000.0,
-    "precise.heading_check.beside_sigmas": 1e6,
-    "precise.heading_check.sigma_rad": 1000.0,
-    "precise.filter.step.change_sigma_rad": 0.003,
+    f"{_HEADING_CHECK}turned_rad": 1000.0,
+    f"{_HEADING_CHECK}beside_sigmas": 1e6,
+    f"{_HEADING_CHECK}sigma_rad": 1000.0,
 }
-"""Where nobody checks headings, steps that nothing foretells are not taken for turns either: the filter would forecast
-such a turn again, and no look contradicts it, since up to 15 degrees show the Target face alone. A follower on a slalom
-turned away by 24 degrees in nine timesteps."""
+_FEW_TURNS = {"precise.filter.step.change_sigma_rad": 0.003}
+"""Where nobody checks headings, the filter's model of a step that nothing foretells hardly turns: such a turn would be
+forecast again, and for the first 10 degrees or more the Target face alone shows, which does not contradict it. With the
+default a follower on a slalom turned away by 24 degrees in nine timesteps."""
 
 
 def backdrop(followers: int, spacing: Spacing, own: Mapping[str, object]) -> dict[str, object]:
@@ -41,6 +42,10 @@ def edges_before_board(marker: MarkerParameters, own: Mapping[str, object]) -> d
     return {name: value for name, value in _BEFORE_LIGHT_BOARD.items() if light and name not in own}
 
 
-def unchecked_headings(schedule: Schedule, own: Mapping[str, object]) -> dict[str, float]:
+def at_once_alignment(schedule: Schedule, own: Mapping[str, object]) -> dict[str, float]:
     """Return the fine-tuner's parameters of a schedule that has no time to drive to where the heading shows."""
-    return {name: value for name, value in _NO_HEADING_CHECKS.items() if schedule.at_once and name not in own}
+    if not schedule.at_once:
+        return {}
+    checks = any(name.startswith(_HEADING_CHECK) for name in own)
+    found = _NO_HEADING_CHECKS if checks else {**_NO_HEADING_CHECKS, **_FEW_TURNS}
+    return {name: value for name, value in found.items() if name not in own}
