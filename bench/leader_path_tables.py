@@ -75,13 +75,13 @@ def ratio_lines(runs: Runs, others: Sequence[str]) -> Iterator[list[str]]:
             yield [path, "all", *(cell(list(itertools.chain(*column)), 1.0, 2) for column in columns)]
 
 
-def bowl_lines(rows: Sequence[Row]) -> list[str]:
-    """Return the page's table of the bowl: medians of the correction distance, and paired ratios."""
+def surface_lines(rows: Sequence[Row], surface: str) -> list[str]:
+    """Return the page's table of one surface: medians of the correction distance, and paired ratios."""
     runs = grouped(rows)
     head = ["path", "runs", "lost", *(f"`{name}`" for name in (*OTHERS, OWN)), f"/ `{BASELINE}`", "/ best of the three"]
     lines = []
     for path in PATHS:
-        if found := runs.get((path, "bowl")):
+        if found := runs.get((path, surface)):
             medians = [middle([rank(row) for row in found.get(name, {}).values()], 100.0) for name in OTHERS]
             own = cell([rank(row) for row in found.get(OWN, {}).values()], 100.0)
             lines.append([path, *_counts(found), *medians, own, *_page_ratios(found)])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -76,11 +77,11 @@ def sensitivity_lines() -> list[str]:
     return [*sensitivity.table_lines(rows), "", f"{len(rows)} runs, {count} seeds of each."]
 
 
-def leader_path_lines() -> list[str]:
-    """Return the table of the bowl's leader paths."""
+def leader_path_lines(surface: str) -> list[str]:
+    """Return the table of one surface's leader paths."""
     import leader_path_tables
 
-    return leader_path_tables.bowl_lines(_leader_path_rows())
+    return leader_path_tables.surface_lines(_leader_path_rows(), surface)
 
 
 def _leader_path_rows() -> list[leader_path_runs.Row]:
@@ -121,7 +122,9 @@ SENSITIVITY_PAGE = ROOT / "docs" / "explanation" / "sensitivity.md"
 TABLES = (
     Table(ROOT / "README.md", "tracks", readme_lines),
     Table(PREDICTORS_PAGE, "bowl", bowl_lines),
-    Table(PREDICTORS_PAGE, "leader_paths", leader_path_lines),
+    Table(PREDICTORS_PAGE, "leader_paths", partial(leader_path_lines, "bowl")),
+    Table(PREDICTORS_PAGE, "leader_paths_plane", partial(leader_path_lines, "plane")),
+    Table(PREDICTORS_PAGE, "leader_paths_saddle", partial(leader_path_lines, "saddle")),
     Table(PREDICTORS_PAGE, "blackouts", blackout_lines),
     Table(SENSITIVITY_PAGE, "sensitivity", sensitivity_lines),
 )

@@ -104,12 +104,12 @@ def test_leader_paths_are_compared_with_the_best_of_the_other_models_on_the_bowl
     for name, correction_m in zip((*leader_path_tables.OTHERS, "formation"), (2.0, 1.0, 0.5, 0.1), strict=True):
         rows += [path_row("bowl", name, seed, correction_m) for seed in range(3)]
         rows += [path_row("plane", name, seed, 0.3) for seed in range(3)]
-    (line,) = leader_path_tables.bowl_lines(rows)[2:]
+    (line,) = leader_path_tables.surface_lines(rows, "bowl")[2:]
     assert line == (
         "| circle12 | 3 | 0 | 200.0 | 100.0 | 50.0 | 10.0 (10.0..10.0) | 0.05 (0.05..0.05) | 0.20 (0.20..0.20) |"
     )
     rows.append(path_row("bowl", "formation", 3, 0.1, "leader_lost"))
-    assert "| `formation` 1 |" in leader_path_tables.bowl_lines(rows)[2]
+    assert "| `formation` 1 |" in leader_path_tables.surface_lines(rows, "bowl")[2]
 
 
 def test_growths_over_a_blackout_are_paired_over_seeds() -> None:
