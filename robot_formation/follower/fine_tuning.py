@@ -15,7 +15,7 @@ from robot_formation.alignment.mode import AlignmentMode, Decision, Verdict
 from robot_formation.alignment.paper_mode import AlignmentParameters, PaperMode
 from robot_formation.alignment.precise.precise_mode import PreciseAlignment, PreciseParameters
 from robot_formation.follower.actions import Action, Done, Lost, Report, RequestFrames, SendMove, Warn
-from robot_formation.follower.actuation_bias import ActuationBias
+from robot_formation.follower.actuation_error import MeanActuationError
 from robot_formation.follower.alignment_state import AlignmentState, State
 from robot_formation.follower.blind_driving import blind_timesteps, out_of_view
 from robot_formation.geometry.se2 import FORMATION_DISTANCE_M, Motion
@@ -172,7 +172,7 @@ class FineTuner:
         self._step: UncertainMotion | None = None  # the neighbour's next one, as forecast
         self._planned_move: Motion | None = None  # the prediction move, until it has ended
         self._actuation_error: Motion | None = None
-        self._bias = ActuationBias()
+        self._mean_error = MeanActuationError()
         self._frames: list[Sequence[Block]] = []
         self._frames_wanted = 0
         self._looks = 0  # in this timestep
@@ -210,7 +210,7 @@ class FineTuner:
             self._actuation_error = Motion(
                 motion.x_m - planned.x_m, motion.y_m - planned.y_m, motion.yaw_rad - planned.yaw_rad
             )
-            self._bias.learn(planned, self._actuation_error)
+            self._mean_error.learn(planned, self._actuation_error)
         self._displacement = self._displacement.then(motion)
         self._alignment.moved(self._asked, motion)
         return self._report(None) if self._blind else self._look()
@@ -323,7 +323,7 @@ class FineTuner:
 
     def _planned(self) -> Motion:
         if self.rule.delayed:  # the place where it was seen last
-            return Motion() if self.timestep == 1 or self._left is None else self._bias.compensated(self._left)
+            return Motion() if self.timestep == 1 or self._left is None else self._mean_error.compensated(self._left)
         if self.timestep == 1:
             return self._first_step
         if self.timestep <= COLLECTION_TIMESTEPS or self._prediction is None:

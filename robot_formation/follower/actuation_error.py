@@ -23,7 +23,7 @@ _MOST_ERROR_M = 0.01
 """A move that ends farther beside its command was braked, refused or pushed."""
 
 
-class _Mean:
+class _RunningMean:
     """Running mean of errors along v and to the left [m], forgetting old ones."""
 
     def __init__(self) -> None:
@@ -37,12 +37,12 @@ class _Mean:
         self.left_m += gain * (left_m - self.left_m)
 
 
-class ActuationBias:
+class MeanActuationError:
     """Mean errors of moves; those of moves backwards apart, where the robot coasts the other way."""
 
     def __init__(self) -> None:
-        """Know of no move: all biases are zero."""
-        self._ahead, self._back = _Mean(), _Mean()
+        """Know of no move: all means are zero."""
+        self._ahead, self._back = _RunningMean(), _RunningMean()
 
     def learn(self, commanded: Motion, error: Motion) -> None:
         """Process a move that ended `error` (measured less commanded, in the frame of its start) beside its command."""
@@ -59,5 +59,5 @@ class ActuationBias:
         mean = self._mean(forward)
         return Motion.from_legs(turn, forward - mean.ahead_m, left - mean.left_m)
 
-    def _mean(self, forward_m: float) -> _Mean:
+    def _mean(self, forward_m: float) -> _RunningMean:  # a leg back that is shorter than an error counts as none
         return self._back if forward_m < -_MOST_ERROR_M else self._ahead

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from robot_formation.follower.actions import SendMove
-from robot_formation.follower.actuation_bias import ActuationBias
+from robot_formation.follower.actuation_error import MeanActuationError
 from robot_formation.follower.fine_tuning import FineTuner, FineTunerParameters, Phase
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import from_mapping
@@ -21,20 +21,20 @@ LEFT_M = 41.5 / 836.0
 COAST_M = 0.003
 
 
-def learned(*moves: tuple[Motion, Motion]) -> ActuationBias:
-    bias = ActuationBias()
+def learned(*moves: tuple[Motion, Motion]) -> MeanActuationError:
+    mean = MeanActuationError()
     for commanded, error in moves:
-        bias.learn(commanded, error)
-    return bias
+        mean.learn(commanded, error)
+    return mean
 
 
 def test_a_constant_error_is_taken_off_to_the_end() -> None:
-    bias = ActuationBias()
+    mean = MeanActuationError()
     desired = Motion.from_legs(0.3, 0.05, 0.01)
     for _ in range(60):
-        commanded = bias.compensated(desired)
+        commanded = mean.compensated(desired)
         reached = Motion.from_legs(0.3, commanded.legs[1] + 0.004, commanded.legs[2] - 0.003)
-        bias.learn(commanded, Motion(reached.x_m - commanded.x_m, reached.y_m - commanded.y_m))
+        mean.learn(commanded, Motion(reached.x_m - commanded.x_m, reached.y_m - commanded.y_m))
     assert (reached.x_m, reached.y_m) == pytest.approx((desired.x_m, desired.y_m), abs=1e-6)
     assert commanded.yaw_rad == desired.yaw_rad
 
@@ -47,9 +47,9 @@ def test_the_first_moves_count_a_half_and_a_third() -> None:
 
 
 def test_moves_backwards_have_a_bias_of_their_own() -> None:
-    bias = learned((Motion(0.05), Motion(0.004)), (Motion(-0.05), Motion(-0.002)))
-    assert bias.compensated(Motion(0.05)).x_m == pytest.approx(0.048)
-    assert bias.compensated(Motion(-0.05)).x_m == pytest.approx(-0.049)
+    mean = learned((Motion(0.05), Motion(0.004)), (Motion(-0.05), Motion(-0.002)))
+    assert mean.compensated(Motion(0.05)).x_m == pytest.approx(0.048)
+    assert mean.compensated(Motion(-0.05)).x_m == pytest.approx(-0.049)
 
 
 @pytest.mark.parametrize(
