@@ -75,6 +75,7 @@ def collect(missing: list[str]) -> Report:
         "system": _system,
         "ros": _ros,
         "modules": _modules,
+        "hot_loops": _hot_loops,
         "domain": _domain,
         "shared_memory": _shared_memory,
     }
@@ -152,6 +153,17 @@ def _modules(missing: list[str]) -> dict[str, object]:
         if name == "pybullet":
             report["pybullet_numpy"] = None if module is None else bool(module.isNumpyEnabled())
     return report
+
+
+def _hot_loops(missing: list[str]) -> dict[str, object]:
+    """Which modules a C compiler has sped up; without one a run takes longer and is the same."""
+    from robot_formation.hot_loops import COMPILED, INTERPRETED, OUT_OF_DATE, hot_loops
+
+    found = hot_loops()
+    return {
+        state: ", ".join(name.partition(".")[2] for name in found if found[name] == state) or None
+        for state in (COMPILED, INTERPRETED, OUT_OF_DATE)
+    }
 
 
 def _domain(missing: list[str]) -> dict[str, object]:

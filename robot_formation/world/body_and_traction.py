@@ -203,7 +203,6 @@ class Body:
         # The last step's twist: it changes with the distance driven only.
         yielding, twist = soft * max(-travel, min(travel, self.twist)), 0.0
         gradient, height = self._surface.gradient, self._surface.height
-        sqrt = math.sqrt
         (px, py, pz), (qx, qy, qz, qw) = _read_pose(body, client)
         (vx, vy, vz), (wx, wy, wz) = _read_velocity(body, client)
         # Columns of the rotation matrix: forward (f), left (l), up (u).
@@ -219,9 +218,9 @@ class Body:
             centre_z = pz + f_z * wheel_x + l_z * wheel_y + u_z * wheel_z
             # Contact point: the centre moved by the radius against the normal found there (two iterations).
             slope_x, slope_y = gradient(centre_x, centre_y)
-            n_z = contact_radius / sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+            n_z = contact_radius / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
             slope_x, slope_y = gradient(centre_x + slope_x * n_z, centre_y + slope_y * n_z)
-            n_z = 1.0 / sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
+            n_z = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
             n_x, n_y = -slope_x * n_z, -slope_y * n_z
             at_x, at_y = centre_x - contact_radius * n_x, centre_y - contact_radius * n_y
             at_z = centre_z - contact_radius * n_z
@@ -240,7 +239,7 @@ class Body:
                 continue
             # Forward and left in the tangent plane, and the contact's velocity along them.
             off = f_x * n_x + f_y * n_y + f_z * n_z
-            scale = 1.0 / sqrt(1.0 - off * off)
+            scale = 1.0 / math.sqrt(1.0 - off * off)
             a_x, a_y, a_z = (
                 (f_x - off * n_x) * scale,
                 (f_y - off * n_y) * scale,
@@ -255,7 +254,7 @@ class Body:
             free = (past - aside) * HALF_ROOT
             limit = grip * load + 1e-12
             bristle = (wheel.bristle + dt * slip) / (
-                1.0 + dt * (abs(slip) * sigma0 / limit + sqrt(ahead * ahead + aside * aside) / relaxation)
+                1.0 + dt * (abs(slip) * sigma0 / limit + math.sqrt(ahead * ahead + aside * aside) / relaxation)
             )
             wheel.bristle = bristle
             hold = -(sigma0 * bristle + sigma1 * slip)

@@ -44,6 +44,8 @@ class Robot:
         self._steps_moving = 0
         self._steps_resting = 0
         self._rest_steps = max(1, round(parameters.rest_time_s * parameters.physics_hz))
+        self._rest_speed_square = parameters.rest_speed_m_s**2
+        self._rest_rate_square = parameters.rest_rate_rad_s**2
         self._timeout_steps = round(parameters.motion_timeout_s * parameters.physics_hz)
         self._stop_stream = generator(seed, start.name, "motor stop")
         self._surface = surface
@@ -135,12 +137,13 @@ class Robot:
             if wheel.state != HELD:
                 self._steps_resting = 0
                 return False
-        self._steps_resting = self._steps_resting + 1 if self._slow(*self.body.speed_squares()) else 0
+        linear, angular = self.body.speed_squares()
+        self._steps_resting = self._steps_resting + 1 if self._slow(linear, angular) else 0
         return self._steps_resting >= self._rest_steps
 
     def _slow(self, linear: float, angular: float) -> bool:
         """Whether squares of speed and turning rate count as rest."""
-        return linear < self.parameters.rest_speed_m_s**2 and angular < self.parameters.rest_rate_rad_s**2
+        return linear < self._rest_speed_square and angular < self._rest_rate_square
 
     def finished(self) -> bool:
         """Count one step of the motion; True when it is over (then the robot sleeps, if it may)."""

@@ -103,10 +103,7 @@ class World:
     @property
     def owes(self) -> bool:
         """Whether a motion isn't at rest, requested frames are outstanding, or time was asked for."""
-        for robot in self._robots.values():
-            if robot.moving:
-                return True
-        return any(self._frames_owed.values()) or self.step_count < self._owed_until
+        return self._owes()
 
     @property
     def at_rest(self) -> bool:
@@ -192,7 +189,7 @@ class World:
 
     def advance(self) -> list[Event]:
         """Go on to the next instant at which something is published, and return it; empty if nothing is owed."""
-        while self.owes:
+        while self._owes():
             events = self._step()
             if events or self.step_count == self._owed_until:
                 return events
@@ -211,7 +208,7 @@ class World:
 
     # --- time -------------------------------------------------------------------------------------------------------
 
-    def _step(self, *, skip: bool = True) -> list[Event]:
+    def _step(self, skip: bool = True) -> list[Event]:
         """Make one step and return what is due then; with `skip` go straight to the next frame if all robots sleep."""
         if not self._step_physics():
             self.step_count += 1
@@ -285,6 +282,12 @@ class World:
                 development = kept.development
             kept = self._pictures[name] = _Picture(placements, poses, development)
         return sensor.expose(kept.development, self.step_count / self.parameters.physics_hz)
+
+    def _owes(self) -> bool:
+        for robot in self._robots.values():
+            if robot.moving:
+                return True
+        return any(self._frames_owed.values()) or self.step_count < self._owed_until
 
     # --- checks -----------------------------------------------------------------------------------------------------
 

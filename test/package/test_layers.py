@@ -12,7 +12,7 @@ from repository import PACKAGE
 
 # From the bottom to the top, in a strict order: a part imports those before it only.
 LAYERS = [
-    ("errors", "exit_codes", "extras", "json_values", "names", "parameters", "paths", "plugins", ""),
+    ("errors", "exit_codes", "extras", "json_values", "names", "parameters", "paths", "plugins", "hot_loops", ""),
     *(
         (room,)
         for room in (
