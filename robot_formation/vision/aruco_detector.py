@@ -13,9 +13,8 @@ from robot_formation.parameters import parameter
 from robot_formation.vision.aruco_patterns import MODULES, QUIET_MODULES, dictionary
 from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
-from robot_formation.vision.pixy2.block_tracking import Tracker, limited
+from robot_formation.vision.pixy2.block_tracking import ALL_BLOCKS, ALL_SIGNATURES, Tracker
 from robot_formation.vision.pixy2.boxes import Box
-from robot_formation.vision.pixy2.detector import ALL_SIGNATURES
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import WIDTH, checked
 
@@ -141,8 +140,8 @@ class TagDetector:
 
     def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
         """See `BlockSensor`."""
-        reported = self._tracker.step(self.detect(picture), time_us)
-        return limited(reported, ALL_SIGNATURES, len(reported))
+        self._tracker.step(self.detect(picture), time_us)
+        return self._tracker.answer(ALL_SIGNATURES, ALL_BLOCKS)
 
 
 def _opencv(parameters: TagParameters) -> Any:

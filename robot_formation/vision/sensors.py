@@ -11,9 +11,8 @@ from robot_formation import plugins
 from robot_formation.vision.aruco_detector import BlockSensor
 from robot_formation.vision.marker import MarkerKind
 from robot_formation.vision.pixy2.block import Block
-from robot_formation.vision.pixy2.block_tracking import Tracker, limited
+from robot_formation.vision.pixy2.block_tracking import ALL_BLOCKS, ALL_SIGNATURES, Tracker
 from robot_formation.vision.pixy2.boxes import Box
-from robot_formation.vision.pixy2.detector import ALL_SIGNATURES
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import checked
 
@@ -48,8 +47,8 @@ class OutsideSensor:
         """
         with plugins.guarded(KIND, self._name, "detect"):
             boxes = _boxes(self._made.detect(checked(picture)))
-        reported = self._tracker.step(boxes, time_us)
-        return limited(reported, ALL_SIGNATURES, len(reported))
+        self._tracker.step(boxes, time_us)
+        return self._tracker.answer(ALL_SIGNATURES, ALL_BLOCKS)
 
     def reset(self) -> None:
         """See `BlockSensor`."""

@@ -1,4 +1,7 @@
-"""From row segments to blobs: connecting what overlaps the row above (Pixy2 behaviour)."""
+"""From row segments to blobs: connecting what overlaps the row above (Pixy2 behaviour).
+
+The loops go segment by segment. Where there is a C compiler they are compiled, with the types of blobs.pxd.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robot_formation.vision.pixy2.parameters import SIGNATURES
 from robot_formation.vision.pixy2.picture import HEIGHT
 from robot_formation.vision.pixy2.scanner import Segments
-from robot_formation.vision.pixy2.teaching import IntArray
 
-_ROW = 256
-"""More than a row has cells, so that places in different rows never overlap."""
-_SIGNATURE = 256 * _ROW
-"""More than a picture has rows, so that the rows of different signatures are never neighbours."""
-_DOUBLINGS = (HEIGHT - 1).bit_length()
-"""Steps of twice the reach that lead from any row to the first one."""
+_COLUMNS = 256
+"""More than a picture has columns."""
+_NEVER = HEIGHT + 2
+"""Stands for a row after the last one."""
 
 
 class Blob(NamedTuple):
@@ -39,86 +40,154 @@ def connect(segments: Segments) -> dict[int, list[Blob]]:
     equal area come in the reverse order of their ends, those that ended together from right to left. (The camera may
     notice an end a row late beyond its row's last segment; that is not followed, and exchanges equal areas at most.)
     """
-    if not len(segments.row):
+    count = len(segments.row)
+    if not count:
         return {}
-    order = segments.signature.astype(np.uint8).argsort(kind="stable")
-    signature, row, start, end = (array.take(order) for array in segments)
-    rows = signature * _SIGNATURE + row * _ROW
-    root = _roots(rows, rows + start, rows + end)
-    area = np.zeros_like(root)
-    np.add.at(area, root, end - start + 1)
-    left, right, bottom, place = start.copy(), end.copy(), row.copy(), start.copy()
-    np.minimum.at(left, root, start)
-    np.maximum.at(right, root, end)
-    # Segments come from top to bottom: the last assignment counts.
-    bottom[root] = row
-    place[root] = start
-    blobs = (root == np.arange(len(root))).nonzero()[0]
-    signature, left, right, top, bottom, area, place = (
-        array.take(blobs) for array in (signature, left, right, row, bottom, area, place)
-    )
-    noticed = _ends(rows, signature, bottom)
-    kept = ((noticed == len(rows)) | (bottom - top > 1)).nonzero()[0]
-    kept = kept.take(np.lexsort((-place.take(kept), -noticed.take(kept), -area.take(kept), signature.take(kept))))
-    columns = (array.take(kept).tolist() for array in (signature, left, right, top, bottom, area))
+    signature, row, start, end = [array.data for array in segments]
+    # Segments by signature, of one signature in the order of the scan; the first segment of each segment's blob; and of
+    # blobs, by their first segment: area, sides and the start of the last segment.
+    order, root, area, left, right, bottom, place = [array.data for array in np.empty((7, count), np.intp)]
+    stops, noticed = np.zeros(SIGNATURES + 1, np.intp).data, np.empty(_NEVER + 1, np.intp).data
+    _sort(signature, order, stops)
     found: dict[int, list[Blob]] = {}
-    for blob in map(Blob, *columns):
-        found.setdefault(blob.signature, []).append(blob)
+    for number in range(1, SIGNATURES + 1):
+        mine = order[stops[number - 1] : stops[number]]
+        if not len(mine):
+            continue
+        _join(mine, row, start, end, root)
+        _measure(mine, row, start, end, root, area, left, right, bottom, place)
+        _notice(mine, row, noticed)
+        ranked = []
+        for position in range(len(mine)):
+            segment = mine[position]
+            if root[segment] == segment:
+                top, last = row[segment], bottom[segment]
+                seen = noticed[last + 2]
+                if seen == _NEVER or last - top > 1:
+                    rank = (area[segment] * (_NEVER + 1) + seen) * _COLUMNS + place[segment]
+                    ranked.append((-rank, segment))
+        if ranked:
+            ranked.sort()
+            found[number] = [
+                Blob(number, left[segment], right[segment], row[segment], bottom[segment], area[segment])
+                for _, segment in ranked
+            ]
     return found
 
 
-def _ends(rows: IntArray, signature: IntArray, bottom: IntArray) -> IntArray:
-    """The segment at which each blob's end is noticed: in the next row but one or later; all segments if in none."""
-    noticed = rows.searchsorted(signature * _SIGNATURE + (bottom + 2) * _ROW)
-    noticed[rows.take(noticed, mode="clip") // _SIGNATURE != signature] = len(rows)
-    return noticed
-
-
-def _roots(rows: IntArray, left: IntArray, right: IntArray) -> IntArray:
-    """The first segment of each segment's blob, shape (n,).
+def _sort(signature: memoryview[int], order: memoryview[int], stops: memoryview[int]) -> None:
+    """Sort segments by signature.
 
     Args:
-        rows: place of each segment's row, ascending.
-        left: place of each segment's first cell, ascending.
-        right: place of each segment's last cell, ascending.
+        signature: of each segment.
+        order: takes the segments by signature, those of one signature in their order.
+        stops: takes the place in `order` after each signature's last segment, by signature number; zeros before.
     """
-    first = right.searchsorted(left - _ROW)
-    parents = left.searchsorted(right - _ROW, "right") - first
-    own = np.arange(len(rows))
-    root = np.where(parents > 0, first, own)
-    for _ in range(_DOUBLINGS):
-        root = root.take(root)
-    # Left to do: segments with several parents, and those without one between two segments of the row above.
-    before, after = rows.take(first - 1, mode="wrap"), rows.take(first, mode="clip")
-    between = (parents == 0) & (before == after) & (before == rows - _ROW)
-    special = (between | (parents > 1)).nonzero()[0].tolist()
-    if not special:
-        return root
-    joined = _joined(root, special, first.take(special).tolist(), parents.take(special).tolist())
-    for segment in joined:
-        own[segment] = _find(joined, segment)
-    return own.take(root)
+    count = len(signature)
+    for segment in range(count):
+        stops[signature[segment]] += 1
+    for number in range(1, len(stops)):
+        stops[number] += stops[number - 1]
+    for segment in range(count - 1, -1, -1):
+        stops[signature[segment]] -= 1
+        order[stops[signature[segment]]] = segment
+    # Each is now where its signature begins, which is where the one before it ends.
+    for number in range(len(stops) - 1):
+        stops[number] = stops[number + 1]
+    stops[len(stops) - 1] = count
 
 
-def _joined(root: IntArray, special: list[int], first: list[int], parents: list[int]) -> dict[int, int]:
-    """Join blobs through special segments, from top to bottom: which root belongs to which earlier one."""
-    joined: dict[int, int] = {}
-    for segment, parent, count in zip(special, first, parents, strict=True):
-        if count:
-            # Its own root is that of its first parent.
-            for other in root[parent + 1 : parent + count].tolist():
-                one, two = sorted((_find(joined, int(root[segment])), _find(joined, other)))
-                if one != two:
-                    joined[two] = one
-        else:
+def _join(
+    mine: memoryview[int], row: memoryview[int], start: memoryview[int], end: memoryview[int], root: memoryview[int]
+) -> None:
+    """Find the first segment of each segment's blob, or an earlier one of its blob from which `_find` goes on to that.
+
+    Args:
+        mine: the segments of one signature, by row and column.
+        row: row of each segment.
+        start: first cell of each segment.
+        end: last cell of each segment.
+        root: takes the result, by segment.
+    """
+    # Of the row above, places in `mine`: its first segment, the first that ends no earlier than the current segment
+    # starts, and the first of the next row.
+    first = 0
+    near = 0
+    stop = 0
+    # Where the current row begins.
+    begin = 0
+    current = -2
+    for number in range(len(mine)):
+        segment = mine[number]
+        if row[segment] != current:
+            first = begin if row[segment] == current + 1 else number
+            near, stop, begin, current = first, number, number, row[segment]
+        while near < stop and end[mine[near]] < start[segment]:
+            near += 1
+        root[segment] = segment
+        other = near
+        while other < stop and start[mine[other]] <= end[segment]:
+            one = _find(root, segment)
+            two = _find(root, mine[other])
+            if one < two:
+                root[two] = one
+            else:
+                root[one] = two
+            other += 1
+        if other == near and first < near < stop:
             # It lies in a gap of the row above, within a blob if both neighbours belong to the same one.
-            neighbour = _find(joined, int(root[parent - 1]))
-            if neighbour == _find(joined, int(root[parent])):
-                joined[segment] = neighbour
-    return joined
+            one = _find(root, mine[near - 1])
+            if one == _find(root, mine[near]):
+                root[segment] = one
 
 
-def _find(joined: dict[int, int], segment: int) -> int:
-    while segment in joined:
-        segment = joined[segment]
+def _find(root: memoryview[int], segment: int) -> int:
+    """The first segment of a segment's blob."""
+    while root[segment] != segment:
+        # Half of the way is left for the next search.
+        root[segment] = root[root[segment]]
+        segment = root[segment]
     return segment
+
+
+def _measure(
+    mine: memoryview[int],
+    row: memoryview[int],
+    start: memoryview[int],
+    end: memoryview[int],
+    root: memoryview[int],
+    area: memoryview[int],
+    left: memoryview[int],
+    right: memoryview[int],
+    bottom: memoryview[int],
+    place: memoryview[int],
+) -> None:
+    """Measure the blobs of one signature; the results belong to each blob's first segment."""
+    for number in range(len(mine)):
+        segment = mine[number]
+        # Earlier segments have their blob's first one already, and no segment's is later than itself.
+        blob = root[root[segment]]
+        root[segment] = blob
+        if blob == segment:
+            area[blob] = 0
+            left[blob] = start[segment]
+            right[blob] = end[segment]
+        area[blob] += end[segment] - start[segment] + 1
+        left[blob] = min(left[blob], start[segment])
+        right[blob] = max(right[blob], end[segment])
+        # Segments come from top to bottom: the last one counts.
+        bottom[blob] = row[segment]
+        place[blob] = start[segment]
+
+
+def _notice(mine: memoryview[int], row: memoryview[int], noticed: memoryview[int]) -> None:
+    """Find the row in which the camera notices that a blob has ended: the first with segments from a given one on."""
+    row_stop = _NEVER
+    noticed[_NEVER] = _NEVER
+    for number in range(len(mine) - 1, -1, -1):
+        begin = row[mine[number]]
+        # No segments lie in the rows between.
+        for later in range(begin + 1, row_stop):
+            noticed[later] = noticed[row_stop]
+        noticed[begin] = begin
+        row_stop = begin

@@ -1,9 +1,10 @@
-"""Boxes: filters, merging of boxes that face each other, removal of nested ones (Pixy2 behaviour)."""
+"""Boxes: filters, merging of boxes that face each other, removal of nested ones (Pixy2 behaviour).
+
+The loops go over pairs of boxes. Where there is a C compiler they are compiled, with the types of boxes.pxd.
+"""
 
 from __future__ import annotations
 
-import itertools
-import operator
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -13,7 +14,7 @@ CODE_AREA = 10
 """Smallest blob of a colour code signature, cells."""
 
 
-@dataclass(slots=True)
+@dataclass
 class Box:
     """A box in frame pixels, all sides inclusive.
 
@@ -69,101 +70,82 @@ def merged(boxes: list[Box], distance: int) -> list[Box]:
 
     Every box in turn takes in those after it; passes over all are repeated until one changes nothing.
     """
-    changed = _some_near(boxes, distance)
+    changed = True
     while changed:
         changed = False
-        alive: list[Box] = []
-        while boxes:
-            box, *others = boxes
-            boxes = []
-            left, right, top, bottom = _reach(box, distance)
-            for other in others:
+        alive = [True] * len(boxes)
+        for i in range(len(boxes)):
+            if not alive[i]:
+                continue
+            box = boxes[i]
+            for j in range(i + 1, len(boxes)):
+                other = boxes[j]
                 # Most pairs are far apart: that is told first, and fast.
-                if other.left > right or other.right < left or other.top > bottom or other.bottom < top:
-                    boxes.append(other)
-                elif _merge(box, other, distance):
+                if other.left - box.right > distance or other.top - box.bottom > distance:
+                    continue
+                if alive[j] and _merge(box, other, distance):
+                    alive[j] = False
                     changed = True
-                    left, right, top, bottom = _reach(box, distance)
-                else:
-                    boxes.append(other)
-            alive.append(box)
-        boxes = alive
+        if changed:
+            boxes = [box for box, left in zip(boxes, alive, strict=True) if left]
     return boxes
-
-
-def _some_near(boxes: list[Box], distance: int) -> bool:
-    """Whether any two boxes are near enough to be looked at more closely; most boxes of a picture of many are not."""
-    from_left = sorted(boxes, key=operator.attrgetter("left"))
-    for place, box in enumerate(from_left, 1):
-        _, right, top, bottom = _reach(box, distance)
-        for other in itertools.islice(from_left, place, None):
-            if other.left > right:
-                break
-            if other.top <= bottom and other.bottom >= top:
-                return True
-    return False
-
-
-def _reach(box: Box, distance: int) -> tuple[int, int, int, int]:
-    """Left, right, top and bottom of what is near enough to a box to be merged with it."""
-    return box.left - distance, box.right + distance, box.top - distance, box.bottom + distance
 
 
 def _merge(box: Box, other: Box, distance: int) -> bool:
     """Let a box take in another one if they face each other on either axis."""
-    rows_overlap = box.top <= other.bottom and other.top <= box.bottom
-    columns_overlap = box.left <= other.right and other.left <= box.right
-    if rows_overlap:
-        span = _joined(box.left, box.right, other.left, other.right, distance)
-        if span is not None:
-            box.left, box.right = span
-            box.top, box.bottom = min(box.top, other.top), max(box.bottom, other.bottom)
+    side = 0
+    if box.top <= other.bottom and other.top <= box.bottom:
+        side = _facing(box.left, box.right, other.left, other.right, distance)
+        if side < 0:
+            box.left = other.left
+        elif side > 0:
+            box.right = other.right
+        if side:
+            box.top = min(box.top, other.top)
+            box.bottom = max(box.bottom, other.bottom)
             return True
-    if columns_overlap:
-        span = _joined(box.top, box.bottom, other.top, other.bottom, distance)
-        if span is not None:
-            box.top, box.bottom = span
-            box.left, box.right = min(box.left, other.left), max(box.right, other.right)
+    if box.left <= other.right and other.left <= box.right:
+        side = _facing(box.top, box.bottom, other.top, other.bottom, distance)
+        if side < 0:
+            box.top = other.top
+        elif side > 0:
+            box.bottom = other.bottom
+        if side:
+            box.left = min(box.left, other.left)
+            box.right = max(box.right, other.right)
             return True
     return False
 
 
-def _joined(low: int, high: int, other_low: int, other_high: int, distance: int) -> tuple[int, int] | None:
-    """The joined extent on an axis, or None if the other interval is too far away or strictly inside."""
+def _facing(low: int, high: int, other_low: int, other_high: int, distance: int) -> int:
+    """Which end of an interval that of another one replaces: the low one (-1), the high one (1) or none (0).
+
+    None if the other interval is too far away or strictly inside.
+    """
     if other_low <= low and (low <= other_high <= high or 0 <= low - other_high <= distance):
-        return other_low, high
+        return -1
     if low <= other_low and (other_low <= high <= other_high or 0 <= other_low - high <= distance):
-        return low, other_high
-    return None
+        return 1
+    return 0
 
 
 def without_nested(boxes: list[Box]) -> list[Box]:
     """Drop boxes that lie within another one, common sides allowed, whatever their signatures."""
-    dead: set[int] = set()
-    turn = -1
-    for i, j in _nested_pairs(boxes):
-        if j in dead or (i in dead and i != turn):
+    alive = [True] * len(boxes)
+    for i in range(len(boxes)):
+        if not alive[i]:
             continue
-        # The camera goes on comparing later boxes with the one that it has just dropped, until that one's turn ends.
-        turn = i
-        dead.add(j if _contains(boxes[i], boxes[j]) else i)
-    return [box for i, box in enumerate(boxes) if i not in dead]
-
-
-def _nested_pairs(boxes: list[Box]) -> list[tuple[int, int]]:
-    """Pairs i < j of boxes one of which lies within the other, in ascending order."""
-    pairs = []
-    from_left = sorted((box.left, i, box) for i, box in enumerate(boxes))
-    for place, (_, i, box) in enumerate(from_left, 1):
-        right, top, bottom = box.right, box.top, box.bottom
-        for left, j, other in itertools.islice(from_left, place, None):
-            if left > right:
-                break
-            if other.top > bottom or other.bottom < top:
+        box = boxes[i]
+        # The camera goes on comparing later boxes with one that it has just dropped, until that one's turn ends.
+        for j in range(i + 1, len(boxes)):
+            other = boxes[j]
+            if not alive[j] or other.left > box.right or other.right < box.left:
                 continue
-            if _contains(box, other) or _contains(other, box):
-                pairs.append((i, j) if i < j else (j, i))
-    return sorted(pairs)
+            if _contains(box, other):
+                alive[j] = False
+            elif _contains(other, box):
+                alive[i] = False
+    return [box for box, left in zip(boxes, alive, strict=True) if left]
 
 
 def _contains(box: Box, other: Box) -> bool:

@@ -13,10 +13,8 @@ from robot_formation.vision.pixy2.parameters import SIGNATURES, DetectorParamete
 from robot_formation.vision.pixy2.signatures import Signature
 from robot_formation.vision.pixy2.teaching import SCALE_BITS
 
-CENTRE = 32
-"""Bin of the difference 0: bin i holds the differences r-g (or b-g) from 8 (i - 32) to 8 (i - 32) + 7."""
-_BINS = 64
-_STRIDE = 256
+STRIDE = 64
+"""Bins of each difference, r-g or b-g: bin i, from -32 to 31, holds the differences from 8 i to 8 i + 7."""
 _CODE_GAIN = np.float32(1.5)
 
 
@@ -51,7 +49,8 @@ class ColorTable:
     """All that the scanner asks per cell.
 
     Attributes:
-        labels: signature number or 0 by 256 * iu + iv, shape (16384,), uint8; iu is the bin of r-g, iv that of b-g.
+        labels: signature number or 0 by 64 * iu + iv, shape (4096,), uint8; iu is the bin of r-g, iv that of b-g.
+            Numbers below zero count from the end.
         low: lower bounds of (r-g)/(r+g+b) and (b-g)/(r+g+b) by signature number, shape (2, 8). A quotient above its
             bound is one whose u (or v), truncated to whole 1/32768, is above the run-time bound.
         high: upper bounds, alike.
@@ -68,7 +67,7 @@ class ColorTable:
         """Build the table: once per change of signatures or parameters, not per frame."""
         u, v, total, bins = _colors()
         min_sum = max(1, int(np.float32(765) * np.float32(parameters.min_brightness)))
-        labels = np.zeros(_BINS * _STRIDE, np.uint8)
+        labels = np.zeros(STRIDE * STRIDE, np.uint8)
         low, high = np.zeros((2, 2, SIGNATURES + 1))
         # Lower numbers win, hence are written last.
         for signature in sorted(signatures, key=lambda s: -s.sig):
@@ -103,5 +102,5 @@ def _colors() -> tuple[_Int32, _Int32, _Int32, _Int32]:
     divisor = np.maximum(total, 1)
     u = ((r - g << SCALE_BITS) / divisor).astype(np.int32)
     v = ((b - g << SCALE_BITS) / divisor).astype(np.int32)
-    bins = ((r - g >> 3) + CENTRE) * _STRIDE + (b - g >> 3) + CENTRE
+    bins = (r - g >> 3) * STRIDE + (b - g >> 3)
     return u, v, total, bins

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from robot_formation.vision.pixy2.blobs import connect
 from robot_formation.vision.pixy2.block import Block
-from robot_formation.vision.pixy2.block_tracking import Tracker, limited
+from robot_formation.vision.pixy2.block_tracking import ALL_BLOCKS, ALL_SIGNATURES, Tracker
 from robot_formation.vision.pixy2.boxes import CODE_AREA, Box, filtered, merged, without_nested
 from robot_formation.vision.pixy2.codes import with_codes
 from robot_formation.vision.pixy2.color_table import ColorTable, is_code
@@ -17,7 +17,6 @@ from robot_formation.vision.pixy2.picture import checked
 from robot_formation.vision.pixy2.scanner import Scanner, Segments
 from robot_formation.vision.pixy2.signatures import Signature, sorted_unique
 
-ALL_SIGNATURES = 0xFF
 _MIXED = 3
 
 
@@ -37,7 +36,6 @@ class BlockDetector:
     def __init__(self, signatures: Iterable[Signature], parameters: DetectorParameters | None = None) -> None:
         self._parameters = parameters or DetectorParameters()
         self._tracker = Tracker(self._parameters.block_filtering, self._parameters.max_tracking_velocity)
-        self._reported: list[Block] = []
         self.configure(signatures, self._parameters)
 
     @property
@@ -65,7 +63,6 @@ class BlockDetector:
     def reset(self) -> None:
         """Forget all tracked blocks; the next frame starts the clock and the indices anew."""
         self._tracker.reset()
-        self._reported = []
 
     def detect(self, picture: ArrayLike) -> list[Box]:
         """Boxes in a single picture, without tracking.
@@ -95,17 +92,17 @@ class BlockDetector:
             PictureError: if the picture has another shape or type.
             ClockError: if the time is not later than the previous frame's.
         """
-        self._reported = self._tracker.step(self.detect(picture), time_us)
+        self._tracker.step(self.detect(picture), time_us)
         return self.get_blocks()
 
-    def get_blocks(self, sigmap: int = ALL_SIGNATURES, max_blocks: int = 255) -> list[Block]:
+    def get_blocks(self, sigmap: int = ALL_SIGNATURES, max_blocks: int = ALL_BLOCKS) -> list[Block]:
         """Blocks of the last frame as the camera's getBlocks request answers.
 
         Args:
             sigmap: bit sig-1 for each signature wanted, 0x80 for colour codes.
             max_blocks: how many blocks are wanted.
         """
-        return limited(self._reported, sigmap, max_blocks)
+        return self._tracker.answer(sigmap, max_blocks)
 
     def _boxes(self, segments: Segments) -> list[Box]:
         """Blobs per signature, filtered, merged, without nested ones; then colour codes."""

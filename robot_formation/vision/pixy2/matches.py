@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from robot_formation.vision.pixy2.color_table import CENTRE, ColorTable
+from robot_formation.vision.pixy2.color_table import STRIDE, ColorTable
 from robot_formation.vision.pixy2.picture import Picture, checked
-
-_TABLE_STRIDE = 256
 
 
 def matching_signatures(picture: Picture, table: ColorTable) -> npt.NDArray[np.uint8]:
@@ -29,7 +27,7 @@ def matching_signatures(picture: Picture, table: ColorTable) -> npt.NDArray[np.u
     """
     cells = checked(picture)[:, ::2].astype(np.int32)
     red, green, blue = np.moveaxis(cells, 2, 0)
-    bins = ((red - green >> 3) + CENTRE) * _TABLE_STRIDE + (blue - green >> 3) + CENTRE
+    bins = (red - green >> 3) * STRIDE + (blue - green >> 3)
     labels = table.labels[bins]
     pairs = cells[:, :-1] + cells[:, 1:]
     total = np.maximum(pairs.sum(axis=2), 1)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from robot_formation.vision.pixy2.block import Block
-from robot_formation.vision.pixy2.block_tracking import ClockError, Tracker, limited
+from robot_formation.vision.pixy2.block_tracking import ALL_BLOCKS, ALL_SIGNATURES, ClockError, Tracker
 from robot_formation.vision.pixy2.boxes import Box
 
 PERIOD_60 = 16_200
@@ -16,9 +16,15 @@ def box(x: int = 100, y: int = 80, signature: int = 1, size: int = 40) -> Box:
     return Box(signature, x - size // 2, x + size // 2, y - size // 2, y + size // 2)
 
 
-def frames(tracker: Tracker, sequence: Sequence[Sequence[Box]], period_us: int) -> list[list[Block]]:
+def step(tracker: Tracker, boxes: list[Box], time_us: int) -> list[Block]:
+    """Reported blocks after a frame."""
+    tracker.step(boxes, time_us)
+    return tracker.answer(ALL_SIGNATURES, ALL_BLOCKS)
+
+
+def frames(tracker: Tracker, sequence: Sequence[list[Box]], period_us: int) -> list[list[Block]]:
     """Reported blocks after each frame of a sequence of box lists."""
-    return [tracker.step(boxes, number * period_us) for number, boxes in enumerate(sequence)]
+    return [step(tracker, boxes, number * period_us) for number, boxes in enumerate(sequence)]
 
 
 @pytest.mark.parametrize(
@@ -56,7 +62,7 @@ def test_a_jump_beyond_the_velocity_gate_makes_a_new_track(period_us: int, large
     for jump, index in ((largest, 0), (largest + 1, 1)):
         tracker = Tracker(0, 65)
         frames(tracker, [[box(x=60)]] * 2 + [[box(x=60 + jump)]], period_us)
-        assert tracker.step([box(x=60 + jump)], 3 * period_us)[0].index == index
+        assert step(tracker, [box(x=60 + jump)], 3 * period_us)[0].index == index
 
 
 def test_a_candidate_that_never_validates_uses_up_an_index() -> None:
@@ -68,13 +74,13 @@ def test_indices_wrap_after_255() -> None:
     tracker = Tracker(0, 10)
     jumping = [[box(x=60 if number % 2 else 250)] for number in range(257)]
     frames(tracker, [*jumping, jumping[-1]], PERIOD_60)
-    assert tracker.step(jumping[-1], 258 * PERIOD_60)[0].index == 0
+    assert step(tracker, jumping[-1], 258 * PERIOD_60)[0].index == 0
 
 
 def test_two_blocks_that_cross_keep_the_nearer_track() -> None:
     tracker = Tracker(0, 65)
     frames(tracker, [[box(x=50), box(x=150)]] * 2, PERIOD_60)
-    blocks = tracker.step([box(x=140), box(x=60)], 2 * PERIOD_60)
+    blocks = step(tracker, [box(x=140), box(x=60)], 2 * PERIOD_60)
     assert [(block.index, block.x) for block in blocks] == [(0, 60), (1, 140)]
 
 
@@ -82,7 +88,7 @@ def test_an_established_track_takes_its_box_from_a_dearer_owner() -> None:
     tracker = Tracker(0, 320)
     frames(tracker, [[box(x=50), box(x=100)]] * 2, PERIOD_60)
     # The first track is served first and takes the only box; the second is nearer and evicts it.
-    blocks = tracker.step([box(x=98)], 2 * PERIOD_60)
+    blocks = step(tracker, [box(x=98)], 2 * PERIOD_60)
     assert [(block.index, block.x) for block in blocks] == [(1, 98)]
 
 
@@ -94,7 +100,7 @@ def test_ticks_may_wrap_while_a_block_is_waiting() -> None:
     tracker = Tracker(40, 65)
     wrap_us = (1 << 16) << 10
     tracker.step([], 0)
-    reported = [tracker.step([box()], wrap_us - 10 * PERIOD_30 + n * PERIOD_30) for n in range(21)]
+    reported = [step(tracker, [box()], wrap_us - 10 * PERIOD_30 + n * PERIOD_30) for n in range(21)]
     assert [bool(blocks) for blocks in reported] == [False] * 20 + [True]
 
 
@@ -113,19 +119,22 @@ def test_reset_starts_the_clock_and_the_indices_anew() -> None:
     assert frames(tracker, [[box()]] * 2, PERIOD_60)[-1][0].index == 0
 
 
-def block(signature: int = 1, width: int = 10, index: int = 0) -> Block:
-    return Block(signature, 100, 80, width, 10, 0, index, 0)
+def seen(boxes: list[Box]) -> Tracker:
+    """A tracker that reports these boxes."""
+    tracker = Tracker(0, 65)
+    frames(tracker, [boxes] * 2, PERIOD_60)
+    return tracker
 
 
 def test_get_blocks_answers_the_first_eighteen_tracks_largest_first() -> None:
-    blocks = [block(width=n, index=n) for n in range(30)]
-    assert [b.index for b in limited(blocks, 0xFF, 255)] == list(range(17, -1, -1))
-    assert [b.index for b in limited(blocks, 0xFF, 2)] == [17, 16]
-    assert limited(blocks, 0xFF, 0) == []
+    tracker = seen([Box(1, 10 * number, 10 * number + number, 0, 10) for number in range(30)])
+    assert [b.index for b in tracker.answer(0xFF, 255)] == list(range(17, -1, -1))
+    assert [b.index for b in tracker.answer(0xFF, 2)] == [17, 16]
+    assert tracker.answer(0xFF, 0) == []
 
 
 def test_get_blocks_selects_signatures_and_codes_by_bit() -> None:
-    blocks = [block(signature=1), block(signature=3), block(signature=7), block(signature=10)]
-    assert [b.signature for b in limited(blocks, 0b101, 255)] == [1, 3]
-    assert [b.signature for b in limited(blocks, 0x80, 255)] == [10]
-    assert [b.signature for b in limited(blocks, 0x40, 255)] == [7]
+    tracker = seen([box(signature=number) for number in (1, 3, 7, 10)])
+    assert [b.signature for b in tracker.answer(0b101, 255)] == [1, 3]
+    assert [b.signature for b in tracker.answer(0x80, 255)] == [10]
+    assert [b.signature for b in tracker.answer(0x40, 255)] == [7]
