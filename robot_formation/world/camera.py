@@ -12,23 +12,27 @@ from numpy.typing import NDArray
 from robot_formation.surface import Surface
 from robot_formation.world.parameters import CameraParameters, WorldParameters
 from robot_formation.world.pose import Pose
-from robot_formation.world.scene import FULL, RobotFaces, Scene
+from robot_formation.world.scene import FULL, Colour, RobotFaces, Scene
 
 RenderedPicture = NDArray[np.uint8]
 """What a robot's camera gives: RGB (rows, columns, 3) of the size that the camera's parameters say."""
 Light = NDArray[np.uint16]
 """Linear light (rows, columns, 3): reflectance under the room's light, 65535 is full."""
+_Face = tuple[NDArray[np.int32], Colour]
+"""Fixed-point canvas coordinates of a convex face's corners (n, 2), and its light."""
 
 SUPERSAMPLING = 2
 SHIFT = 6
 """Fractional bits of drawn coordinates."""
+_MARGIN_ROWS = 3
+"""Rows of a picture above a face's topmost corner: its outline and the blur stay below the first of them."""
 
 
 class Camera:
     """Pinhole camera on a robot: the light that its lens throws on the sensor; `Sensor` makes pictures of it.
 
     Image coordinates: integer (column, row) are pixel centres, origin top left. Light is computed linearly, averaged
-    over 2 x 2 samples and blurred.
+    over 2 x 2 samples and blurred. Rows above all faces show the wall and are filled in at the end.
     """
 
     def __init__(self, surface: Surface, parameters: WorldParameters) -> None:
@@ -40,7 +44,10 @@ class Camera:
         right = np.array([math.sin(pan), -math.cos(pan), 0.0])
         self._axes = np.stack([right, np.cross(forward, right), forward])  # rows: image right, image down, depth
         self._lens = np.array([p.x_m, p.y_m, p.z_m])
+        self._centre = np.array([p.centre_x_px, p.centre_y_px])
+        self._wall = np.asarray(self._scene.wall_light * FULL, np.uint16)
         self._canvas = np.empty((p.height_px * SUPERSAMPLING, p.width_px * SUPERSAMPLING, 3), np.uint16)
+        self._sharp = np.empty((p.height_px, p.width_px, 3), np.uint16)
         self._blurred = np.empty((p.height_px, p.width_px, 3), np.float32)
         self._bounds = _view_bounds(p)
         self._unit_bounds = self._bounds / np.linalg.norm(self._bounds, axis=1, keepdims=True)
@@ -59,14 +66,7 @@ class Camera:
 
     def may_see(self, robot: Pose, others: Sequence[Pose]) -> list[Pose]:
         """List those of other robots of which something may be in a robot's view; the picture is of no others."""
-        rotation, lens = self.optical_frame(robot)
-        radius = self._scene.robot_radius_m
-        found = []
-        for other in others:
-            middle = rotation @ (other.matrix() @ self._scene.robot_middle + other.position - lens)
-            if middle[2] > self.parameters.near_m - radius and (self._unit_bounds @ middle).min() > -radius:
-                found.append(other)
-        return found
+        return self._in_view(others, *self.optical_frame(robot))
 
     def light(self, robot: Pose, others: Sequence[Pose]) -> Light:
         """Light on the sensor, uint16 (rows, columns, 3) red, green, blue, of a robot that sees robots at `others`.
@@ -75,71 +75,104 @@ class Camera:
         """
         p = self.parameters
         rotation, lens = self.optical_frame(robot)
-        canvas = self._canvas
-        canvas[:] = np.asarray(self._scene.wall_light * FULL, np.uint16)
-        self._draw_plate(lens, rotation)
-        seen = self.may_see(robot, others)
-        for other in sorted(seen, key=lambda pose: -float(np.sum((np.asarray(pose.position) - lens) ** 2))):
-            self._draw_robot(self._scene.robot_faces(other, lens), lens, rotation)
-        small: Light = np.asarray(
-            cv2.resize(canvas, (p.width_px, p.height_px), interpolation=cv2.INTER_AREA), np.uint16
-        )
-        if p.blur_px > 0.0:
-            # OpenCV blurs floats twice as fast as 16-bit integers.
-            blurred = self._blurred
-            np.copyto(blurred, small)
-            cv2.GaussianBlur(blurred, (3, 3), p.blur_px, dst=blurred, borderType=cv2.BORDER_REPLICATE)
-            small = np.rint(blurred, out=blurred).astype(np.uint16)
-        return small
+        faces = self._plate(rotation, lens)
+        seen = self._in_view(others, rotation, lens)
+        if len(seen) > 1:
+            seen.sort(key=lambda pose: -float(np.sum((np.asarray(pose.position) - lens) ** 2)))
+        for other in seen:
+            faces += self._robot(self._scene.robot_faces(other, lens), rotation, lens)
+        first = self._first_row(faces)
+        canvas = self._canvas[SUPERSAMPLING * first :]
+        canvas[:] = self._wall
+        for outline, colour in faces:
+            # On the whole canvas: OpenCV's lines depend on where they are clipped.
+            cv2.fillConvexPoly(self._canvas, outline, colour, cv2.LINE_8, SHIFT)
+        light: Light = np.empty((p.height_px, p.width_px, 3), np.uint16)
+        self._sample(canvas, light[first:])
+        light[:first] = light[first]
+        return light
 
-    def _draw_plate(self, lens: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
-        """Draw the patches of the plate that are in view, far to near."""
-        near = self.parameters.near_m
-        local = (self._scene.plate_points - lens) @ rotation.T
-        drawn = self._on_canvas(np.maximum(local, [-np.inf, -np.inf, near]))
-        corners = self._scene.patch_corners
-        depths = local[corners, 2]
-        ahead = depths.min(axis=1) >= near
-        outline = drawn[corners]
-        # A patch with all corners behind one of the planes that bound the view can't be seen.
-        hidden = (local @ self._bounds.T < 0.0)[corners].all(axis=1).any(axis=1)
-        shown = np.flatnonzero((depths.max(axis=1) >= near) & ~hidden)
-        for index in shown[np.argsort(-depths[shown].mean(axis=1), kind="stable")].tolist():
-            colour = self._scene.patch_light[index]
-            if ahead[index]:
-                cv2.fillConvexPoly(self._canvas, outline[index], colour, lineType=cv2.LINE_8, shift=SHIFT)
-            else:
-                self._fill(local[corners[index]], colour)
+    def _in_view(
+        self, others: Sequence[Pose], rotation: NDArray[np.float64], lens: NDArray[np.float64]
+    ) -> list[Pose]:
+        radius = self._scene.robot_radius_m
+        found = []
+        for other in others:
+            middle = rotation @ (other.matrix() @ self._scene.robot_middle + other.position - lens)
+            if middle[2] > self.parameters.near_m - radius and (self._unit_bounds @ middle).min() > -radius:
+                found.append(other)
+        return found
 
-    def _draw_robot(self, faces: RobotFaces, lens: NDArray[np.float64], rotation: NDArray[np.float64]) -> None:
+    def _plate(self, rotation: NDArray[np.float64], lens: NDArray[np.float64]) -> list[_Face]:
+        """List the patches of the plate that are in view, far to near."""
+        near, scene = self.parameters.near_m, self._scene
+        local = (scene.plate_points - lens) @ rotation.T
+        depths = np.ascontiguousarray(local[:, 2])
+        # A patch with all corners behind one of the planes that bound the view can't be seen. A point's answers for the
+        # four planes are four bytes, looked at as one number.
+        behind = (local @ self._bounds.T < 0.0).view(np.uint32)
+        ahead = scene.over_patches(np.maximum, depths) >= near
+        shown = np.flatnonzero(ahead & (scene.over_patches(np.bitwise_and, behind) == 0))
+        middles = np.add.reduce(depths[scene.patch_corners[shown]], axis=1)
+        shown = shown[np.argsort(-middles, kind="stable")]
+        corners = scene.patch_corners[shown]
+        outlines = list(self._on_canvas(local[:, :2], np.maximum(depths, near))[corners])
+        for cut in np.flatnonzero(depths[corners].min(axis=1) < near).tolist():
+            outlines[cut] = self._cut(local[corners[cut]])
+        colours = [scene.patch_light[index] for index in shown.tolist()]
+        return list(zip(outlines, colours, strict=True))
+
+    def _robot(self, faces: RobotFaces, rotation: NDArray[np.float64], lens: NDArray[np.float64]) -> list[_Face]:
+        """List what of a robot's faces lies ahead of the lens."""
         local = (faces.corners - lens) @ rotation.T
-        ahead = len(local) > 0 and local[:, 2].min() >= self.parameters.near_m
-        corners = self._on_canvas(local) if ahead else local
+        depths = local[:, 2]
+        ahead = len(local) > 0 and depths.min() >= self.parameters.near_m
+        fixed = self._on_canvas(local[:, :2], depths) if ahead else None
+        found: list[_Face] = []
         first = 0
         for last, colour in zip(faces.ends, faces.colours, strict=True):
-            if ahead:
-                cv2.fillConvexPoly(self._canvas, corners[first:last], colour, lineType=cv2.LINE_8, shift=SHIFT)
-            else:
-                self._fill(local[first:last], colour)
+            outline = self._cut(local[first:last]) if fixed is None else fixed[first:last]
+            if len(outline):
+                found.append((outline, colour))
             first = last
+        return found
 
-    def _fill(self, corners: NDArray[np.float64], colour: tuple[float, float, float]) -> None:
-        """Draw a convex polygon (n, 3) of the optical frame in linear light."""
-        near = self.parameters.near_m
-        if corners[:, 2].min() < near:
-            corners = clip_near(corners, near)
-            if len(corners) < 3:
-                return
-        cv2.fillConvexPoly(self._canvas, self._on_canvas(corners), colour, lineType=cv2.LINE_8, shift=SHIFT)
+    def _cut(self, corners: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Canvas coordinates of what lies ahead of a convex polygon (n, 3) of the optical frame; empty for nothing."""
+        kept = clip_near(corners, self.parameters.near_m)
+        return self._on_canvas(kept[:, :2], kept[:, 2]) if len(kept) > 2 else np.empty((0, 2), np.int32)
 
-    def _on_canvas(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Fixed-point canvas coordinates (n, 2) of points (n, 3) of the optical frame ahead of the lens."""
-        p = self.parameters
-        pixels = points[:, :2] * (p.focal_length_px / points[:, 2])[:, None]
-        pixels += (p.centre_x_px, p.centre_y_px)
+    def _on_canvas(self, points: NDArray[np.float64], depths: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Fixed-point canvas coordinates (n, 2) of points (n, 2) of the optical frame at depths (n,) from `near_m`."""
+        fixed = points * (self.parameters.focal_length_px / depths)[:, None]
+        fixed += self._centre
         # Sample centres lie a quarter pixel around pixel centres; far-off corners stay inside OpenCV's integers.
-        fixed = np.clip((pixels * SUPERSAMPLING + 0.5) * (1 << SHIFT), -1e8, 1e8)
-        return np.rint(fixed).astype(np.int32)
+        fixed *= SUPERSAMPLING << SHIFT
+        fixed += 0.5 * (1 << SHIFT)
+        np.minimum(fixed, 1e8, out=fixed)
+        np.maximum(fixed, -1e8, out=fixed)
+        return np.rint(fixed, out=fixed).astype(np.int32)
+
+    def _first_row(self, faces: list[_Face]) -> int:
+        """Row of the picture from which on there may be something other than the evenly lit wall."""
+        last = self.parameters.height_px - 1
+        if not faces:
+            return last
+        top = int(np.concatenate([outline for outline, _ in faces])[:, 1].min())
+        return min(max(0, top // (SUPERSAMPLING << SHIFT) - _MARGIN_ROWS), last)
+
+    def _sample(self, canvas: Light, light: Light) -> None:
+        """Average the samples of these rows of the canvas and blur them, into the same rows of `light`."""
+        size, blur_px = (light.shape[1], light.shape[0]), self.parameters.blur_px
+        if not blur_px:
+            cv2.resize(canvas, size, dst=light, interpolation=cv2.INTER_AREA)
+            return
+        sharp, blurred = self._sharp[: len(light)], self._blurred[: len(light)]
+        cv2.resize(canvas, size, dst=sharp, interpolation=cv2.INTER_AREA)
+        # OpenCV blurs floats twice as fast as 16-bit integers.
+        np.copyto(blurred, sharp)
+        cv2.GaussianBlur(blurred, (3, 3), blur_px, dst=blurred, borderType=cv2.BORDER_REPLICATE)
+        np.copyto(light, np.rint(blurred, out=blurred), casting="unsafe")
 
 
 def _view_bounds(parameters: CameraParameters) -> NDArray[np.float64]:

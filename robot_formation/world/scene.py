@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from robot_formation.world.tag_faces import FACES, tag_rectangles
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
+_Value = TypeVar("_Value", bound=np.generic)
 
 FULL = 65535.0
 """Linear light 1 in the 16-bit drawing."""
@@ -53,7 +54,7 @@ class Scene:
     Attributes:
         wall_light: linear light of the evenly lit background, 0 to 1.
         plate_points: corners of the plate's patches in the world, (n, 3), metres.
-        patch_corners: indices of each patch's four corners, (patches, 4).
+        patch_corners: indices of each patch's four corners, (patches, 4); patches are in rows along y.
         patch_light: red, green, blue of each patch.
         robot_middle: in the middle of a robot, (3,) in its base_link frame.
         robot_radius_m: farthest from there that any of its faces reaches.
@@ -109,8 +110,15 @@ class Scene:
         self.robot_middle = 0.5 * (self._corners.min(axis=0) + self._corners.max(axis=0))
         self.robot_radius_m = float(np.linalg.norm(self._corners - self.robot_middle, axis=1).max())
 
+    def over_patches(self, combine: np.ufunc, values: NDArray[_Value]) -> NDArray[_Value]:
+        """Combine values at the plate's points into one per patch, of its four corners."""
+        grid = values.reshape(self._edge_points, self._edge_points)
+        sides = combine(grid[:, :-1], grid[:, 1:])
+        return np.asarray(combine(sides[:-1], sides[1:])).ravel()
+
     def _make_plate(self, surface: Surface, patches: int, albedo: int) -> None:
         edge = np.linspace(0.0, surface.size_m, patches + 1)
+        self._edge_points = len(edge)
         xs, ys = np.meshgrid(edge, edge, indexing="ij")
         self.plate_points = np.stack([xs, ys, surface.heights(xs, ys)], axis=-1).reshape(-1, 3)
         middles = 0.5 * (edge[1:] + edge[:-1])
