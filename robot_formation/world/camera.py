@@ -92,9 +92,7 @@ class Camera:
         light[:first] = light[first]
         return light
 
-    def _in_view(
-        self, others: Sequence[Pose], rotation: NDArray[np.float64], lens: NDArray[np.float64]
-    ) -> list[Pose]:
+    def _in_view(self, others: Sequence[Pose], rotation: NDArray[np.float64], lens: NDArray[np.float64]) -> list[Pose]:
         radius = self._scene.robot_radius_m
         found = []
         for other in others:

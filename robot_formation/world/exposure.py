@@ -82,20 +82,26 @@ def auto_exposure(levels: NDArray[np.float32], tint: Array, parameters: CameraPa
     shortest, longest = exposure_of(0.0, parameters), exposure_of(math.inf, parameters)
     signal_per_s = SIGNAL_PER_LUX_S * parameters.illuminance_lux
     tinted = levels * (tint ** (1.0 / parameters.gamma)).astype(np.float32)[:, None]
-    mean = float(LUMINANCE_WEIGHTS @ tinted.mean(axis=1))
+    mean = _mean_luma(tinted)
     if not mean * signal_per_s:
         return longest
     low, high = ((signal_per_s * end.product_s) ** (1.0 / parameters.gamma) for end in (shortest, longest))
     scale = min(max(parameters.camera_brightness / mean, low), high)
+    scaled = np.empty_like(tinted)
     for _ in range(_STEPS):
-        missing = parameters.camera_brightness - float(
-            LUMINANCE_WEIGHTS @ np.minimum(scale * tinted, 255.0).mean(axis=1)
-        )
+        np.minimum(np.multiply(scale, tinted, out=scaled), 255.0, out=scaled)
+        missing = parameters.camera_brightness - _mean_luma(scaled)
         if missing <= _ACCURACY or scale >= high:
             break
-        slope = float(LUMINANCE_WEIGHTS @ (tinted * (tinted < 255.0 / scale)).mean(axis=1))
+        slope = _mean_luma(np.multiply(tinted, tinted < 255.0 / scale, out=scaled))
         scale = min(scale + missing / slope, high) if slope else high
     return exposure_of(scale**parameters.gamma / signal_per_s, parameters)
+
+
+def _mean_luma(levels: NDArray[np.float32]) -> float:
+    """Mean luma of pixels (3, n)."""
+    # What ndarray.mean does, without its checks.
+    return float(LUMINANCE_WEIGHTS @ (np.add.reduce(levels, axis=1) / np.float32(levels.shape[1])))
 
 
 def white_balance(light: NDArray[np.float32]) -> Array:
@@ -109,7 +115,9 @@ def white_balance(light: NDArray[np.float32]) -> Array:
     """
     red, green, blue = light
     grey = green > _DARKEST
+    most = GREY_RATIO * green
     for other in (red, blue):
-        grey &= (other < GREY_RATIO * green) & (green < GREY_RATIO * other)
+        grey &= other < most
+        grey &= green < GREY_RATIO * other
     sums = (light * grey).sum(axis=1, dtype=float)
     return np.asarray(sums.max() / sums) if sums.all() else np.ones(3)

@@ -21,6 +21,7 @@ from robot_formation.world.exposure import (
     white_balance,
 )
 from robot_formation.world.imperfections import generator
+from robot_formation.world.look_up import look_up
 from robot_formation.world.parameters import CameraParameters
 from robot_formation.world.scene import FULL
 
@@ -32,6 +33,8 @@ _FAINTEST_RIPPLE = 1e-6
 @dataclass(frozen=True)
 class Development:
     """A picture before noise, and how it was made.
+
+    `levels` and `sigma` are the sensor's own arrays: they hold until it develops the next picture.
 
     Attributes:
         levels: 8-bit levels as float32, (rows, columns, 3); beyond 255 where the sensor saturates.
@@ -68,6 +71,10 @@ class Sensor:
         self._shape = (p.height_px, p.width_px, 3)
         self._size = p.height_px * p.width_px * 3
         self._pool = self._stream.standard_normal(3 * self._size, dtype=np.float32)
+        # Large arrays are made once: new memory costs more than what is done in it.
+        self._levels = np.empty(self._shape, np.float32)
+        self._rounded = np.empty(self._shape, np.uint8)
+        self._sigma = np.empty(self._shape, np.float32)
         self._scratch = np.empty(self._shape, np.float32)
         self._table = _level_table(p.gamma)
         self._lamp = lamp_colour(p)
@@ -78,17 +85,19 @@ class Sensor:
     def develop(self, light: Light) -> Development:
         """Expose a picture by `Camera.light`; the first one sets what is not automatic."""
         p = self.parameters
-        samples = light[_SAMPLING // 2 :: _SAMPLING, _SAMPLING // 2 :: _SAMPLING].reshape(-1, 3).T.copy()
+        sampled = light[_SAMPLING // 2 :: _SAMPLING, _SAMPLING // 2 :: _SAMPLING]
+        samples: Light = np.ascontiguousarray(sampled.transpose(2, 0, 1)).reshape(3, -1)
         balance = self._balance(samples)
         tint = self._lamp * balance
         exposure = self._exposure(samples, tint)
         # The curve is a power, so that a factor on the light is a factor on the levels.
         white = SIGNAL_PER_LUX_S * p.illuminance_lux * exposure.product_s * tint
-        levels: NDArray[np.float32] = self._table.take(light)
-        rows = levels.reshape(p.height_px, -1)
+        look_up(self._table, light, out=self._levels)
+        rows = self._levels.reshape(p.height_px, -1)
         rows *= np.tile((white ** (1.0 / p.gamma)).astype(np.float32), p.width_px)
         noise = _noise_table(p, exposure.gain, np.array(balance))
-        return Development(levels, _sigma(levels, noise), exposure, balance, self._ripple(exposure), noise)
+        self._find_sigma(self._levels, noise, self._sigma)
+        return Development(self._levels, self._sigma, exposure, balance, self._ripple(exposure), noise)
 
     def expose(self, development: Development, time_s: float) -> RenderedPicture:
         """One frame with noise and flicker, uint8 (rows, columns, 3) RGB.
@@ -103,11 +112,17 @@ class Sensor:
             gathered = 1.0 + development.ripple * np.cos(4.0 * math.pi * self.parameters.mains_hz * middles)
             bands = gathered ** (1.0 / self.parameters.gamma)
             levels = levels * bands.astype(np.float32)[:, None, None]
-            sigma = _sigma(levels, development.noise)
+            sigma = self._scratch
+            self._find_sigma(levels, development.noise, sigma)
         offset = int(self._stream.integers(0, 2 * self._size))
         drawn = self._pool[offset : offset + self._size].reshape(self._shape)
         cv2.multiply(drawn, sigma, dst=self._scratch)
         return np.asarray(cv2.add(levels, self._scratch, dtype=cv2.CV_8U), np.uint8)
+
+    def _find_sigma(self, levels: NDArray[np.float32], noise: NDArray[np.float32], sigma: NDArray[np.float32]) -> None:
+        """Look up the standard deviation of every pixel and channel, in 8-bit levels."""
+        cv2.convertScaleAbs(levels, dst=self._rounded)
+        cv2.LUT(self._rounded, noise, dst=sigma)
 
     def _balance(self, samples: Light) -> tuple[float, float, float]:
         """Gains in force for a picture of these samples (3, n)."""
@@ -125,7 +140,7 @@ class Sensor:
         """Exposure in force for a picture of these samples (3, n)."""
         if self._kept_exposure is not None:
             return self._kept_exposure
-        exposure = auto_exposure(self._table.take(samples), tint, self.parameters)
+        exposure = auto_exposure(look_up(self._table, samples), tint, self.parameters)
         if not self.parameters.auto_exposure_correction:
             self._kept_exposure = exposure
         return exposure
@@ -145,6 +160,12 @@ def _level_table(gamma: float) -> NDArray[np.float32]:
     return (255.0 * (np.arange(65536) / FULL) ** (1.0 / gamma)).astype(np.float32)
 
 
+@lru_cache(maxsize=8)
+def _light_of_levels(gamma: float) -> Array:
+    """Linear light, full scale 1, of every 8-bit level, shape (256, 1)."""
+    return np.asarray((np.arange(256) / 255.0) ** gamma)[:, None]
+
+
 def _noise_table(parameters: CameraParameters, gain: float, balance: Array) -> NDArray[np.float32]:
     """Noise in 8-bit levels by level and channel, shape (1, 256, 3).
 
@@ -152,13 +173,8 @@ def _noise_table(parameters: CameraParameters, gain: float, balance: Array) -> N
     curve's slope maps it.
     """
     p = parameters
-    light = ((np.arange(256) / 255.0) ** p.gamma)[:, None]
+    light = _light_of_levels(p.gamma)
     sigma = np.sqrt(balance * p.shot_noise * gain * light + (balance * p.read_noise * gain) ** 2)
     # In the dark the curve is steeper than the noise is small: its slope is taken one standard deviation up.
     slope = 255.0 / p.gamma * np.maximum(np.maximum(light, sigma), 1e-9) ** (1.0 / p.gamma - 1.0)
     return np.asarray(slope * sigma, np.float32)[None]
-
-
-def _sigma(levels: NDArray[np.float32], noise: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Standard deviation of every pixel and channel, in 8-bit levels."""
-    return np.asarray(cv2.LUT(cv2.convertScaleAbs(levels), noise), np.float32)

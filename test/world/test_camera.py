@@ -105,6 +105,15 @@ def test_robots_behind_or_across_the_near_plane_draw_without_error(aside: float)
         assert np.array_equal(picture, camera.light(looking, []))
 
 
+@pytest.mark.parametrize("tilt_deg", [-30.0, 0.0, 25.0])
+def test_rows_that_only_show_wall_are_what_drawing_them_gives(tilt_deg: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    camera = Camera(BOWL, parameters(camera={"tilt_deg": tilt_deg}))
+    looking, seen = pose_on_surface(BOWL, 1.3, 0.4, 1.5), [pose_on_surface(BOWL, 0.8, 0.4, 1.5)]
+    quick = [camera.light(looking, others) for others in (seen, [])]
+    monkeypatch.setattr(camera, "_first_row", lambda faces: 0)
+    assert np.array_equal(quick, [camera.light(looking, others) for others in (seen, [])])
+
+
 def test_light_is_the_reflectance_of_what_is_fully_lit_and_knows_no_exposure() -> None:
     for brightness, lux in ((100, 500.0), (20, 10.0)):
         settings = parameters(camera={"wall_albedo": 64, "camera_brightness": brightness, "illuminance_lux": lux})
