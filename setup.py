@@ -27,7 +27,7 @@ def hot_loops() -> list[Extension]:
             ".".join(path.with_suffix("").parts),
             [path.with_suffix(".py").as_posix()],
             # No fused multiplication and addition: compiled or not, results are the same to the last bit.
-            extra_compile_args=["-O2", "-g0", "-ffp-contract=off", "-Wno-maybe-uninitialized"],
+            extra_compile_args=["-O2", "-g0", "-ffp-contract=off"],
         )
         for path in sorted(Path(NAME).rglob("*.pxd"))
     ]
@@ -49,7 +49,12 @@ class CompileHotLoops(build_ext):  # type: ignore[misc]
             return []
         try:
             translated: list[Extension] = cythonize(
-                hot_loops(), build_dir="build/hot_loops", language_level=3, quiet=True
+                hot_loops(),
+                build_dir="build/hot_loops",
+                language_level=3,
+                # C types stand in the .pxd files alone.
+                compiler_directives={"annotation_typing": False},
+                quiet=True,
             )
         except CompileError:
             self.warn("hot loops are not compiled: this version of Cython does not translate them")
