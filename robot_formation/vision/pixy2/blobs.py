@@ -43,27 +43,26 @@ def connect(segments: Segments) -> dict[int, list[Blob]]:
     count = len(segments.row)
     if not count:
         return {}
-    signature, row, start, end = [array.data for array in segments]
-    # Segments by signature, of one signature in the order of the scan; the first segment of each segment's blob; and of
-    # blobs, by their first segment: area, sides and the start of the last segment.
-    order, root, area, left, right, bottom, place = [array.data for array in np.empty((7, count), np.intp)]
+    # Segments by signature, those of one signature in the order of the scan; the first segment of each segment's blob;
+    # and of blobs, by their first segment: area, sides and the start of the last segment.
+    arrays = np.empty((9, count), np.intp)
+    row, start, end, root, area, left, right, bottom, place = [array.data for array in arrays]
     stops, noticed = np.zeros(SIGNATURES + 1, np.intp).data, np.empty(_NEVER + 1, np.intp).data
-    _sort(signature, order, stops)
+    _sort(segments.signature.data, segments.row.data, segments.start.data, segments.end.data, row, start, end, stops)
     found: dict[int, list[Blob]] = {}
     for number in range(1, SIGNATURES + 1):
-        mine = order[stops[number - 1] : stops[number]]
-        if not len(mine):
+        first, stop = stops[number - 1], stops[number]
+        if first == stop:
             continue
-        _join(mine, row, start, end, root)
-        _measure(mine, row, start, end, root, area, left, right, bottom, place)
-        _notice(mine, row, noticed)
+        _join(first, stop, row, start, end, root)
+        _measure(first, stop, row, start, end, root, area, left, right, bottom, place)
+        _notice(first, stop, row, noticed)
         ranked = []
-        for position in range(len(mine)):
-            segment = mine[position]
+        for segment in range(first, stop):
             if root[segment] == segment:
-                top, last = row[segment], bottom[segment]
+                last = bottom[segment]
                 seen = noticed[last + 2]
-                if seen == _NEVER or last - top > 1:
+                if seen == _NEVER or last - row[segment] > 1:
                     rank = (area[segment] * (_NEVER + 1) + seen) * _COLUMNS + place[segment]
                     ranked.append((-rank, segment))
         if ranked:
@@ -75,69 +74,92 @@ def connect(segments: Segments) -> dict[int, list[Blob]]:
     return found
 
 
-def _sort(signature: memoryview[int], order: memoryview[int], stops: memoryview[int]) -> None:
-    """Sort segments by signature.
+def _sort(
+    signature: memoryview[int],
+    any_row: memoryview[int],
+    any_start: memoryview[int],
+    any_end: memoryview[int],
+    row: memoryview[int],
+    start: memoryview[int],
+    end: memoryview[int],
+    stops: memoryview[int],
+) -> None:
+    """Sort segments by signature, those of one signature in their order.
 
     Args:
         signature: of each segment.
-        order: takes the segments by signature, those of one signature in their order.
-        stops: takes the place in `order` after each signature's last segment, by signature number; zeros before.
+        any_row: row of each segment.
+        any_start: first cell of each segment.
+        any_end: last cell of each segment.
+        row: takes the rows, by signature.
+        start: takes the first cells, by signature.
+        end: takes the last cells, by signature.
+        stops: takes the number of segments up to each signature's last one, by signature number; zeros before.
     """
-    count = len(signature)
-    for segment in range(count):
+    for segment in range(len(signature)):
         stops[signature[segment]] += 1
     for number in range(1, len(stops)):
         stops[number] += stops[number - 1]
-    for segment in range(count - 1, -1, -1):
-        stops[signature[segment]] -= 1
-        order[stops[signature[segment]]] = segment
+    # From now on each is the place before which the next one of the signature, from the last one back, belongs.
+    for segment in range(len(signature) - 1, -1, -1):
+        place = stops[signature[segment]] - 1
+        stops[signature[segment]] = place
+        row[place] = any_row[segment]
+        start[place] = any_start[segment]
+        end[place] = any_end[segment]
     # Each is now where its signature begins, which is where the one before it ends.
-    for number in range(len(stops) - 1):
-        stops[number] = stops[number + 1]
-    stops[len(stops) - 1] = count
+    for number in range(1, len(stops)):
+        stops[number - 1] = stops[number]
+    stops[len(stops) - 1] = len(signature)
 
 
 def _join(
-    mine: memoryview[int], row: memoryview[int], start: memoryview[int], end: memoryview[int], root: memoryview[int]
+    first: int,
+    stop: int,
+    row: memoryview[int],
+    start: memoryview[int],
+    end: memoryview[int],
+    root: memoryview[int],
 ) -> None:
-    """Find the first segment of each segment's blob, or an earlier one of its blob from which `_find` goes on to that.
+    """Find an earlier segment of each segment's blob, from which `_find` goes on to the blob's first one.
 
     Args:
-        mine: the segments of one signature, by row and column.
-        row: row of each segment.
-        start: first cell of each segment.
-        end: last cell of each segment.
-        root: takes the result, by segment.
+        first: the first segment of a signature.
+        stop: the first one of the next signature.
+        row: row of each segment, ascending within a signature.
+        start: first cell of each segment, ascending within a row.
+        end: last cell of each segment, ascending within a row.
+        root: takes the result.
     """
-    # Of the row above, places in `mine`: its first segment, the first that ends no earlier than the current segment
-    # starts, and the first of the next row.
-    first = 0
-    near = 0
-    stop = 0
-    # Where the current row begins.
-    begin = 0
+    # Where the row above begins and ends, and its first segment that ends no earlier than the current one starts.
+    above = first
+    row_first = first
+    near = first
     current = -2
-    for number in range(len(mine)):
-        segment = mine[number]
+    for segment in range(first, stop):
         if row[segment] != current:
-            first = begin if row[segment] == current + 1 else number
-            near, stop, begin, current = first, number, number, row[segment]
-        while near < stop and end[mine[near]] < start[segment]:
+            above = row_first if row[segment] == current + 1 else segment
+            row_first = segment
+            near = above
+            current = row[segment]
+        while near < row_first and end[near] < start[segment]:
             near += 1
         root[segment] = segment
+        # The first segment of its blob so far.
+        one = segment
         other = near
-        while other < stop and start[mine[other]] <= end[segment]:
-            one = _find(root, segment)
-            two = _find(root, mine[other])
+        while other < row_first and start[other] <= end[segment]:
+            two = _find(root, other)
             if one < two:
                 root[two] = one
             else:
                 root[one] = two
+                one = two
             other += 1
-        if other == near and first < near < stop:
+        if other == near and above < near < row_first:
             # It lies in a gap of the row above, within a blob if both neighbours belong to the same one.
-            one = _find(root, mine[near - 1])
-            if one == _find(root, mine[near]):
+            one = _find(root, near - 1)
+            if one == _find(root, near):
                 root[segment] = one
 
 
@@ -151,7 +173,8 @@ def _find(root: memoryview[int], segment: int) -> int:
 
 
 def _measure(
-    mine: memoryview[int],
+    first: int,
+    stop: int,
     row: memoryview[int],
     start: memoryview[int],
     end: memoryview[int],
@@ -163,8 +186,7 @@ def _measure(
     place: memoryview[int],
 ) -> None:
     """Measure the blobs of one signature; the results belong to each blob's first segment."""
-    for number in range(len(mine)):
-        segment = mine[number]
+    for segment in range(first, stop):
         # Earlier segments have their blob's first one already, and no segment's is later than itself.
         blob = root[root[segment]]
         root[segment] = blob
@@ -180,14 +202,14 @@ def _measure(
         place[blob] = start[segment]
 
 
-def _notice(mine: memoryview[int], row: memoryview[int], noticed: memoryview[int]) -> None:
+def _notice(first: int, stop: int, row: memoryview[int], noticed: memoryview[int]) -> None:
     """Find the row in which the camera notices that a blob has ended: the first with segments from a given one on."""
-    row_stop = _NEVER
+    after = _NEVER
     noticed[_NEVER] = _NEVER
-    for number in range(len(mine) - 1, -1, -1):
-        begin = row[mine[number]]
+    for segment in range(stop - 1, first - 1, -1):
+        current = row[segment]
         # No segments lie in the rows between.
-        for later in range(begin + 1, row_stop):
-            noticed[later] = noticed[row_stop]
-        noticed[begin] = begin
-        row_stop = begin
+        for later in range(current + 1, after):
+            noticed[later] = after
+        noticed[current] = current
+        after = current

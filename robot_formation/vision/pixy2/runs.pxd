@@ -8,6 +8,7 @@ cdef Py_ssize_t CELLS, HEIGHT, _BRIDGE
     signature=Py_ssize_t, start=Py_ssize_t, end=Py_ssize_t, run=Py_ssize_t, begin=Py_ssize_t, label=Py_ssize_t,
     stop=Py_ssize_t, pixel=Py_ssize_t, red=int, green=int, blue=int, total=int, column=Py_ssize_t,
     near=bint, weight=double, u=double, v=double,
+    low_u=double, high_u=double, low_v=double, high_v=double,
 )
 cpdef Py_ssize_t find_segments(
     const unsigned char[::1] picture,

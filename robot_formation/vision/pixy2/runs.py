@@ -51,6 +51,7 @@ def find_segments(
     signature = 0
     start = 0
     end = 0
+    low_u = high_u = low_v = high_v = 0.0
     for run in range(len(bounds) - 1):
         begin = bounds[run]
         label = labels[begin]
@@ -71,6 +72,8 @@ def find_segments(
             place = begin
         elif place < begin:
             place = begin
+        if place + 1 < stop:
+            low_u, high_u, low_v, high_v = low[0, label], high[0, label], low[1, label], high[1, label]
         while place + 1 < stop:
             # A cell looks at the first of two pixels.
             pixel = 6 * place
@@ -82,11 +85,7 @@ def find_segments(
             weight = float(total)
             u = float(red - green)
             v = float(blue - green)
-            if (
-                total >= min_sum
-                and low[0, label] * weight < u < high[0, label] * weight
-                and low[1, label] * weight < v < high[1, label] * weight
-            ):
+            if total >= min_sum and low_u * weight < u < high_u * weight and low_v * weight < v < high_v * weight:
                 column = place + 1 - row_start
                 near = column - end <= _BRIDGE
                 if signature == label and near:
