@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,20 @@ _TRIANGLE_LIST = 11
 _FARTHEST_M = 1e6
 _LOGGED = (names.DISPLACEMENT, names.RESIDUAL, names.COMMANDED)
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
+
+
+class TruePoses(NamedTuple):
+    """A robot's ground truth, in the order in which it was told.
+
+    Attributes:
+        stamps_ns: simulated time (n,), nanoseconds.
+        positions_m: x, y, z (n, 3).
+        orientations: x, y, z, w (n, 4).
+    """
+
+    stamps_ns: NDArray[np.int64]
+    positions_m: NDArray[np.float64]
+    orientations: NDArray[np.float64]
 
 
 def load_run(path: str | Path, namespace: str | None = None) -> RunRecord:
@@ -105,6 +120,7 @@ def record_of(
     messages: Mapping[str, Sequence[Message]],
     details: Mapping[str, str],
     stamps: Mapping[str, Sequence[int]] | None = None,
+    truth: Mapping[str, TruePoses] | None = None,
 ) -> RunRecord:
     """Return a run's record made from its messages by absolute topic, in order; whoever read them, rosbags or ROS.
 
@@ -113,21 +129,25 @@ def record_of(
         messages: those of the topics that `run_topics` names; topics without messages may be absent.
         details: what the run says of itself.
         stamps: simulated time [ns] of each of these messages, where it is known.
+        truth: ground truth by robot, each of one pose at least; None: it is among the messages.
     """
     messages = defaultdict(tuple, messages)
     stamps = defaultdict(list, stamps or {})
     markers = messages[names.SURFACE.of()]
-    tracks = {robot: _track(messages[names.ground_truth_odom(robot).of()]) for robot in robots}
+    if truth is None:
+        odometry = {robot: messages[names.ground_truth_odom(robot).of()] for robot in robots}
+        truth = {robot: _true_poses(found) for robot, found in odometry.items() if found}
+    latest_ns = [_last_stamp_ns(messages), *(int(poses.stamps_ns[-1]) for poses in truth.values())]
     record = RunRecord(
         leader_moved=_stamped(messages[names.MOVED.of(names.LEADER)]),
         followers=tuple(_follower(robot, messages, stamps) for robot in robots if robot != names.LEADER),
-        tracks={robot: track for robot, track in tracks.items() if track is not None},
-        simulated_s=_last_stamp_ns(messages) / 1e9,
+        tracks={robot: _track(poses) for robot, poses in truth.items()},
+        simulated_s=max(latest_ns) / 1e9,
         details=details,
         ground=read_ground(markers[-1]) if markers else None,
         left_plate=tuple(message.data for message in messages[names.left_plate().of()]),
     )
-    return replace(record, overhead=_overhead(robots, messages, record.dot_height_m))
+    return replace(record, overhead=_overhead(robots, messages, truth, record.dot_height_m))
 
 
 def load_displacements(path: str | Path, robot: str, namespace: str | None = None) -> DisplacementLog:
@@ -264,26 +284,31 @@ def _yaw(quaternion: Message) -> float:
     return yaw_rad((quaternion.x, quaternion.y, quaternion.z, quaternion.w))
 
 
-def _track(messages: Sequence[Message]) -> Track | None:
-    """Turn Odometry messages into a true path, in order of their stamps."""
-    if not messages:
-        return None
+def _true_poses(messages: Sequence[Message]) -> TruePoses:
+    """Take the stamps and poses out of Odometry messages, at least one."""
     if isinstance(messages, Odometry):
-        order = np.argsort(messages.stamps_ns, kind="stable")
-        yaws = np.array([yaw_rad(turn) for turn in messages.orientations.tolist()])
-        tilts = _ups(messages.orientations)[:, :2]
-        return Track(messages.stamps_ns[order], messages.positions_m[order], yaws[order], tilts[order])
+        return TruePoses(messages.stamps_ns, messages.positions_m, messages.orientations)
     poses = [message.pose.pose for message in messages]
-    stamps = np.array([_stamp_ns(message) for message in messages], dtype=np.int64)
-    positions = np.array([(pose.position.x, pose.position.y, pose.position.z) for pose in poses])
-    yaws = np.array([_yaw(pose.orientation) for pose in poses])
-    tilts = np.array([_up(pose.orientation)[:2] for pose in poses])
-    order = np.argsort(stamps, kind="stable")
-    return Track(stamps[order], positions[order], yaws[order], tilts[order])
+    return TruePoses(
+        np.array([_stamp_ns(message) for message in messages], dtype=np.int64),
+        np.array([_place(pose.position) for pose in poses]),
+        np.array([(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w) for pose in poses]),
+    )
+
+
+def _track(poses: TruePoses) -> Track:
+    """Turn poses into a true path, in order of their stamps."""
+    order = np.argsort(poses.stamps_ns, kind="stable")
+    yaws = np.array([yaw_rad(turn) for turn in poses.orientations.tolist()])
+    tilts = _ups(poses.orientations)[:, :2]
+    return Track(poses.stamps_ns[order], poses.positions_m[order], yaws[order], tilts[order])
 
 
 def _overhead(
-    robots: Sequence[str], messages: Mapping[str, Sequence[Message]], dot_height_m: float
+    robots: Sequence[str],
+    messages: Mapping[str, Sequence[Message]],
+    truth: Mapping[str, TruePoses],
+    dot_height_m: float,
 ) -> dict[str, OverheadTrack]:
     """Compare where the tracker saw each robot's dot with the dot's true places.
 
@@ -296,8 +321,8 @@ def _overhead(
     told = [message for message in told if len(message.poses) == len(robots)]
     tracks = {}
     for number, robot in enumerate(robots):
-        truth = messages[names.ground_truth_odom(robot).of()]
-        if not told or not truth:
+        poses = truth.get(robot)
+        if not told or poses is None:
             continue
         places = np.array([_place(message.poses[number].position) for message in told])
         moved = np.append(False, np.any(places[1:] != places[:-1], axis=1))
@@ -306,17 +331,12 @@ def _overhead(
         moved[0] = moved[1]
         stamps = np.array([_stamp_ns(message) for message in told], dtype=np.int64)[moved]
         seen = places[moved]
-        odometry = truth if isinstance(truth, Odometry) else None
-        true_stamps = np.array([_stamp_ns(m) for m in truth]) if odometry is None else odometry.stamps_ns
-        order = np.argsort(true_stamps, kind="stable")
+        order = np.argsort(poses.stamps_ns, kind="stable")
         # A robot that stands says nothing, so its last word before the picture holds.
-        index = np.searchsorted(true_stamps[order], stamps, side="right") - 1
+        index = np.searchsorted(poses.stamps_ns[order], stamps, side="right") - 1
         known = index >= 0
         entries = order[index[known]]
-        if odometry is None:
-            dots = np.array([_dot(truth[entry].pose.pose, dot_height_m) for entry in entries])
-        else:
-            dots = _dots(odometry.positions_m[entries], odometry.orientations[entries], dot_height_m)
+        dots = _dots(poses.positions_m[entries], poses.orientations[entries], dot_height_m)
         tracks[robot] = OverheadTrack(stamps[known], seen[known].reshape(-1, 3), dots.reshape(-1, 3))
     return tracks
 
@@ -325,26 +345,14 @@ def _place(point: Message) -> tuple[float, float, float]:
     return (float(point.x), float(point.y), float(point.z))
 
 
-def _dot(pose: Message, height_m: float) -> tuple[float, float, float]:
-    """Place of a robot's dot, which is on the z axis of its base_link."""
-    x, y, z = _place(pose.position)
-    up_x, up_y, up_z = _up(pose.orientation)
-    return (x + height_m * up_x, y + height_m * up_y, z + height_m * up_z)
-
-
-def _up(q: Message) -> tuple[float, float, float]:
-    """Direction of the z axis of a body of this orientation, a unit vector."""
-    return 2.0 * (q.x * q.z + q.y * q.w), 2.0 * (q.y * q.z - q.x * q.w), 1.0 - 2.0 * (q.x * q.x + q.y * q.y)
-
-
 def _ups(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the directions (n, 3) of the z axes of bodies of orientations (n, 4): see `_up`."""
+    """Return the directions (n, 3) of the z axes of bodies of orientations (n, 4), unit vectors."""
     x, y, z, w = turns.T
     return np.column_stack([2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)])
 
 
 def _dots(places_m: NDArray[np.float64], turns: NDArray[np.float64], height_m: float) -> NDArray[np.float64]:
-    """Return the places (n, 3) of a robot's dot at poses (n, 3) and (n, 4): see `_dot`."""
+    """Return the places (n, 3) of a robot's dot, which is on the z axis of its base_link, at poses (n, 3), (n, 4)."""
     up = _ups(turns)
     return places_m + height_m * up
 

@@ -41,6 +41,8 @@ class WorldComponent(Component):
         self._set_up(parameters, 0)
         self._next = parameters
         self._paused = False
+        self.on_pose: Callable[[RobotPose], None] | None = None
+        """Is told every pose as it is published: who is in the same process needs no message of it."""
         self._cameras = [start.name for start in parameters.starts() if start.camera]
         # Topics are made once: a run sends thousands of messages.
         waiting = ("leader", "fine_tuner") if parameters.schedule is Schedule.TIMER else ()
@@ -193,7 +195,8 @@ class WorldComponent(Component):
 
     def _tell(self, events: list[Event]) -> None:
         self.stamp_ns = self._world.stamp_ns
-        self._send(self._clock, conversions.clock(self.stamp_ns))
+        if self.wanted(self._clock):
+            self._send(self._clock, conversions.clock(self.stamp_ns))
         for event in events:
             self._publish(event)
         self._overhead.after(events, self._world, self._send)
@@ -321,6 +324,8 @@ class WorldComponent(Component):
 
     def _publish_truth(self, event: RobotPose) -> None:
         robot, state = event.robot, event.state
+        if self.on_pose is not None:
+            self.on_pose(event)
         if not any(self.wanted(topic) for topic in self._truth[robot]):
             return
         odom, pose_topic, path_topic = self._truth[robot]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from functools import cache
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -37,7 +38,9 @@ def from_cdr(data: bytes, type_name: str) -> Message:
 
 def to_time(stamp_ns: int) -> Time:
     """Convert integer nanoseconds to a ROS time."""
-    return Time(sec=stamp_ns // _NS, nanosec=stamp_ns % _NS)
+    time = Time()
+    _set_time(time, stamp_ns)
+    return time
 
 
 def to_ns(time: Time) -> int:
@@ -47,7 +50,26 @@ def to_ns(time: Time) -> int:
 
 def header(stamp_ns: int, frame: str = "") -> Header:
     """Make a header."""
-    return Header(stamp=to_time(stamp_ns), frame_id=frame)
+    made = Header()
+    _set_time(made.stamp, stamp_ns)
+    made.frame_id = frame
+    return made
+
+
+def stamped(kind: type[Message], stamp_ns: int, frame: str = "", **fields: Any) -> Message:
+    """Make a message of a kind with a header.
+
+    Generated classes make every message that they hold before they look whether another one was given: filling in their
+    own header costs half of making one for them.
+    """
+    message = kind(**fields)
+    _set_time(message.header.stamp, stamp_ns)
+    message.header.frame_id = frame
+    return message
+
+
+def _set_time(time: Time, stamp_ns: int) -> None:
+    time.sec, time.nanosec = divmod(stamp_ns, _NS)
 
 
 def stamp_of(message: Message) -> int:
@@ -57,7 +79,9 @@ def stamp_of(message: Message) -> int:
 
 def clock(stamp_ns: int) -> Clock:
     """Make a /clock message."""
-    return Clock(clock=to_time(stamp_ns))
+    message = Clock()
+    _set_time(message.clock, stamp_ns)
+    return message
 
 
 def read_clock(message: Clock) -> int:
@@ -84,4 +108,4 @@ def diagnostics(name: str, level: int, text: str, values: Mapping[str, str], sta
         hardware_id="robot_formation",
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )
-    return DiagnosticArray(header=header(stamp_ns), status=[status])
+    return stamped(DiagnosticArray, stamp_ns, status=[status])

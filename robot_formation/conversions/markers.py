@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from robot_formation.conversions.basics import header
+from robot_formation.conversions.basics import stamped
 
 
 def surface_marker(
@@ -22,7 +22,7 @@ def surface_marker(
         triangles: (m, 3) indices of vertices.
         frame: the frame of the vertices.
     """
-    marker = Marker(header=header(0, frame), ns="surface", id=0, type=Marker.TRIANGLE_LIST, action=Marker.ADD)
+    marker = stamped(Marker, 0, frame, ns="surface", id=0, type=Marker.TRIANGLE_LIST, action=Marker.ADD)
     marker.pose.orientation.w = 1.0
     marker.scale.x = marker.scale.y = marker.scale.z = 1.0
     # Triangles share their corners: each is made once, not six times.

@@ -10,13 +10,17 @@ from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceSt
 from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import JointState
 
-from robot_formation.conversions.basics import header
+from robot_formation.conversions.basics import stamped
 from robot_formation.drive.movement_system import WheelCommand
 from robot_formation.errors import MessageError
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import JOINTS, WHEELS
 
 _LARGEST_WHEEL_ANGLE_RAD = 1e4
+_PLANAR = [6 * row + column for row in (0, 1, 5) for column in (0, 1, 5)]
+"""Where the covariance of (x, y, yaw) lies in a pose's (6, 6), row by row."""
+_PLACE = [6 * row + column for row in (0, 1) for column in (0, 1)]
+"""Where that of (x, y) lies."""
 
 
 def joint_command(command: WheelCommand, stamp_ns: int) -> JointState:
@@ -24,8 +28,10 @@ def joint_command(command: WheelCommand, stamp_ns: int) -> JointState:
 
     `effort` is not used, but filled: rosbags can't read what some CDR writers put behind an empty last list.
     """
-    return JointState(
-        header=header(stamp_ns, command.number),
+    return stamped(
+        JointState,
+        stamp_ns,
+        command.number,
         name=list(WHEELS),
         position=list(command.angles_rad),
         velocity=list(command.limits_rad_s),
@@ -57,8 +63,10 @@ def joint_states(
     names: Sequence[str], positions: Sequence[float], velocities: Sequence[float], stamp_ns: int, number: str = ""
 ) -> JointState:
     """Make the joints' report: positions [rad], velocities [rad/s]; `frame_id` is the number of the last command."""
-    return JointState(
-        header=header(stamp_ns, number),
+    return stamped(
+        JointState,
+        stamp_ns,
+        number,
         name=list(names),
         position=list(positions),
         velocity=list(velocities),
@@ -89,7 +97,7 @@ def _set_planar(pose: Pose, motion: Motion) -> None:
 
 def move(motion: Motion, frame: str, stamp_ns: int) -> PoseStamped:
     """Make a move's target in the robot's `base_link`."""
-    message = PoseStamped(header=header(stamp_ns, frame))
+    message = stamped(PoseStamped, stamp_ns, frame)
     _set_planar(message.pose, motion)
     return message
 
@@ -121,12 +129,11 @@ def displacement(
         covariance: of (x, y, yaw), or only of (x, y), row by row [m^2, m rad, rad^2]; a negative variance of x says
             that there is no estimate, a negative one of yaw that the turn isn't known.
     """
-    message = PoseWithCovarianceStamped(header=header(stamp_ns, frame))
+    message = stamped(PoseWithCovarianceStamped, stamp_ns, frame)
     _set_planar(message.pose.pose, motion)
-    axes = (0, 1, 5) if len(covariance) == 9 else (0, 1)
-    full = np.zeros((6, 6))
-    full[np.ix_(axes, axes)] = np.reshape(covariance, (len(axes), len(axes)))
-    message.pose.covariance = full.ravel()
+    full = np.zeros(36)
+    full[_PLANAR if len(covariance) == 9 else _PLACE] = covariance
+    message.pose.covariance = full
     return message
 
 
@@ -141,7 +148,7 @@ def read_displacement(message: PoseWithCovarianceStamped) -> Motion:
 def read_covariance(message: PoseWithCovarianceStamped) -> tuple[float, ...]:
     """Read the covariance of (x, y, yaw), row by row [m^2, m rad, rad^2]."""
     covariance = message.pose.covariance
-    return tuple(float(covariance[6 * row + column]) for row in (0, 1, 5) for column in (0, 1, 5))
+    return tuple(float(covariance[index]) for index in _PLANAR)
 
 
 def has_estimate(message: PoseWithCovarianceStamped) -> bool:
@@ -161,7 +168,7 @@ def read_planar_twist(twist: Twist) -> tuple[float, float, float]:
 
 def odometry(motion: Motion, frame: str, child: str, stamp_ns: int) -> Odometry:
     """Make planar odometry."""
-    message = Odometry(header=header(stamp_ns, frame), child_frame_id=child)
+    message = stamped(Odometry, stamp_ns, frame, child_frame_id=child)
     _set_planar(message.pose.pose, motion)
     return message
 
@@ -177,7 +184,7 @@ def body_odometry(
     stamp_ns: int,
 ) -> Odometry:
     """Make a full pose in `frame`; velocities are in the child frame, as nav_msgs/Odometry asks."""
-    message = Odometry(header=header(stamp_ns, frame), child_frame_id=child)
+    message = stamped(Odometry, stamp_ns, frame, child_frame_id=child)
     p, o, twist = message.pose.pose.position, message.pose.pose.orientation, message.twist.twist
     p.x, p.y, p.z = map(float, position)
     o.x, o.y, o.z, o.w = map(float, quaternion_xyzw)
@@ -193,7 +200,7 @@ def pose_of(odometry_message: Odometry) -> PoseStamped:
 
 def place(position: Sequence[float], frame: str, stamp_ns: int) -> PoseStamped:
     """Make a pose of which only the place (x, y, z) is known: its orientation is the frame's."""
-    message = PoseStamped(header=header(stamp_ns, frame))
+    message = stamped(PoseStamped, stamp_ns, frame)
     p = message.pose.position
     p.x, p.y, p.z = map(float, position)
     return message
@@ -201,9 +208,9 @@ def place(position: Sequence[float], frame: str, stamp_ns: int) -> PoseStamped:
 
 def pose_array(poses: Sequence[PoseStamped], frame: str, stamp_ns: int) -> PoseArray:
     """Make one message of several poses."""
-    return PoseArray(header=header(stamp_ns, frame), poses=[stamped.pose for stamped in poses])
+    return stamped(PoseArray, stamp_ns, frame, poses=[each.pose for each in poses])
 
 
 def path(poses: Sequence[PoseStamped], frame: str, stamp_ns: int) -> Path:
     """Make a path."""
-    return Path(header=header(stamp_ns, frame), poses=list(poses))
+    return stamped(Path, stamp_ns, frame, poses=list(poses))

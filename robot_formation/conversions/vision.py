@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 
-from robot_formation.conversions.basics import header
+from robot_formation.conversions.basics import stamped
 from robot_formation.errors import MessageError
 from robot_formation.vision.luminance import LUMINANCE_WEIGHTS
 from robot_formation.vision.pixy2.block import Block
@@ -21,7 +21,7 @@ def image(pixels: NDArray[np.uint8], frame: str, stamp_ns: int) -> Image:
     """Make an rgb8 image from (height, width, 3), a mono8 one from (height, width)."""
     height, width = pixels.shape[:2]
     encoding, channels = ("mono8", 1) if pixels.ndim == 2 else ("rgb8", 3)
-    message = Image(header=header(stamp_ns, frame), height=height, width=width, encoding=encoding)
+    message = stamped(Image, stamp_ns, frame, height=height, width=width, encoding=encoding)
     message.step = channels * width
     # Assigning an array('B') is checked at once, a list byte by byte.
     data = array.array("B")
@@ -50,7 +50,7 @@ def camera_info(
 ) -> CameraInfo:
     """Make a camera's calibration; distortion is k1, k2, p1, p2, k3 of OpenCV's model."""
     cx, cy = centre_px
-    message = CameraInfo(header=header(stamp_ns, frame), height=height, width=width, distortion_model="plumb_bob")
+    message = stamped(CameraInfo, stamp_ns, frame, height=height, width=width, distortion_model="plumb_bob")
     message.d = list(distortion)
     message.k = [focal_px, 0.0, cx, 0.0, focal_px, cy, 0.0, 0.0, 1.0]
     message.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
@@ -67,8 +67,10 @@ def blocks(found: Sequence[Block], frame: str, stamp_ns: int) -> PointCloud2:
     """Make one point per block, in the image's frame and with its stamp; also when there is none."""
     rows = [(b.signature, b.x, b.y, b.width, b.height, b.angle, b.index, b.age) for b in found]
     size = BLOCK_DTYPE.itemsize
-    return PointCloud2(
-        header=header(stamp_ns, frame),
+    return stamped(
+        PointCloud2,
+        stamp_ns,
+        frame,
         height=1,
         width=len(rows),
         fields=_block_fields(),

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
-from robot_formation import conversions, exit_codes, names
-from robot_formation.analysis.from_bag import record_of, run_topics
+import numpy as np
+
+from robot_formation import exit_codes, names
+from robot_formation.analysis.from_bag import TruePoses, record_of, run_topics
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.bag.run_details import slots_text
 from robot_formation.experiment.in_process import InProcessRun
@@ -15,6 +17,7 @@ from robot_formation.experiment.run_result import RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import Message
 from robot_formation.parameters import to_mapping
+from robot_formation.world.events import RobotPose
 
 OUTCOMES = {exit_codes.DONE: "done", exit_codes.LOST: "lost"}
 
@@ -64,28 +67,36 @@ def run_with_details(
     Raises:
         FormationError: if a component refuses its parameters, or the run stands still.
     """
-    wanted = set(run_topics(scenario.robots))
+    # Ground truth comes as the world's own poses: a message of each would cost more than all else that is kept.
+    wanted = set(run_topics(scenario.robots)) - {names.ground_truth_odom(robot).of() for robot in scenario.robots}
     if not ground:
         wanted.remove(names.SURFACE.of())
     messages: dict[str, list[Message]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
-    now_ns = 0
-    clock = names.CLOCK_TOPIC.of()
+    poses: dict[str, list[RobotPose]] = {robot: [] for robot in scenario.robots}
 
     def listen(topic: str, message: Message) -> None:
-        nonlocal now_ns
-        if topic == clock:
-            now_ns = conversions.read_clock(message)
-        elif topic in wanted:
+        if topic in wanted:
             messages[topic].append(message)
-            stamps[topic].append(now_ns)
+            stamps[topic].append(run.stamp_ns)
         if beside is not None:
             beside(topic, message)
 
     run = make_run(scenario, listen) if make_run is not None else InProcessRun(scenario, listen=listen)
+    run.on_pose = lambda event: poses[event.robot].append(event)
     if beside is None:
-        run.heard = wanted | {clock}
+        run.heard = wanted
     code, reason = run.run()
     outcome = {"outcome": OUTCOMES.get(code, "incomplete")}
-    record = record_of(scenario.robots, messages, {**details, **outcome}, stamps)
+    truth = {robot: _true_poses(events) for robot, events in poses.items() if events}
+    record = record_of(scenario.robots, messages, {**details, **outcome}, stamps, truth)
     return record, RunResult(code, None, reason, run.warnings)
+
+
+def _true_poses(events: Sequence[RobotPose]) -> TruePoses:
+    """Gather a robot's poses as ground-truth odometry tells them."""
+    return TruePoses(
+        np.array([event.stamp_ns for event in events], dtype=np.int64),
+        np.array([event.state.pose.position for event in events]),
+        np.array([event.state.pose.orientation for event in events]),
+    )

@@ -28,6 +28,7 @@ from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import IMAGE_TYPE, Message, Topic, absolute
 from robot_formation.plugins import PluginError
 from robot_formation.schedule.schedules import Spacing
+from robot_formation.world.events import RobotPose
 
 P = TypeVar("P")
 
@@ -49,6 +50,7 @@ class InProcessRun:
         listen: called with every absolute topic name and message, before the components get it.
         heard: the absolute names of all topics that `listen` does something with; None: any. Of others, those that no
             component hears and that are costly to make are left out.
+        on_pose: called with every pose of a robot as it is published, without a message made for it.
     """
 
     scenario: Scenario
@@ -56,6 +58,7 @@ class InProcessRun:
     images: bool = False
     listen: Callable[[str, Message], None] | None = None
     heard: Collection[str] | None = None
+    on_pose: Callable[[RobotPose], None] | None = None
     warnings: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -66,6 +69,12 @@ class InProcessRun:
             for entry in hosted.component.inputs():
                 name = absolute(hosted.namespace, entry.topic.name)
                 self._handlers.setdefault(name, []).append(entry.handler)
+        (self._world,) = (h.component for h in self._hosted if isinstance(h.component, WorldComponent))
+
+    @property
+    def stamp_ns(self) -> int:
+        """Simulated time, nanoseconds: what /clock has told."""
+        return self._world.stamp_ns
 
     def run(self) -> tuple[int, str]:
         """Run until a component ends; return the exit code (0 done, 3 lost or off the plate), and why unless done.
@@ -80,9 +89,10 @@ class InProcessRun:
                 hosted.component.close()
 
     def _run(self) -> tuple[int, str]:
+        world = self._world
+        world.on_pose = self.on_pose
         for hosted in self._hosted:
             hosted.component.start()
-        (world,) = (h.component for h in self._hosted if isinstance(h.component, WorldComponent))
         while True:
             self._deliver()
             ended = [h.component for h in self._hosted if h.component.exit_code is not None]

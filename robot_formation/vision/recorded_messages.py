@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,8 @@ BLOCK_FIELDS = tuple(
     for name in BLOCK_DTYPE.names or ()
 )
 """The fields of a block's point, in their order."""
+_field_values = attrgetter("name", "offset", "datatype", "count")
+_BLOCK_FIELD_VALUES = [_field_values(field) for field in BLOCK_FIELDS]
 
 
 def read_image(message: Message) -> NDArray[np.uint8]:
@@ -79,12 +82,12 @@ def read_blocks(message: Message) -> list[Block]:
     Raises:
         MessageError: its fields are not those of blocks, or it has fewer or more bytes than its points need.
     """
-    fields = tuple(BlockField(field.name, field.offset, field.datatype, field.count) for field in message.fields)
-    if fields != BLOCK_FIELDS or message.point_step != BLOCK_DTYPE.itemsize or message.is_bigendian:
+    fields = [_field_values(field) for field in message.fields]
+    if fields != _BLOCK_FIELD_VALUES or message.point_step != BLOCK_DTYPE.itemsize or message.is_bigendian:
         layout = ", ".join(f"{name} {BLOCK_DTYPE[name].name}" for name in BLOCK_DTYPE.names or ())
         names = ", ".join(field.name for field in message.fields) or "nothing"
         raise MessageError(f"blocks must have the packed little-endian fields {layout}; these have {names}")
     if len(message.data) != message.width * message.height * BLOCK_DTYPE.itemsize:
         raise MessageError(f"blocks of {message.width} points have {len(message.data)} bytes: cut off or mis-sized")
     points = np.frombuffer(message.data, dtype=BLOCK_DTYPE)
-    return [Block(*(int(value) for value in point)) for point in points]
+    return [Block(*point) for point in points.tolist()]

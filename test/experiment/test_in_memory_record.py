@@ -70,7 +70,7 @@ def test_what_nobody_hears_is_not_made() -> None:
         InProcessRun(scenario, listen=lambda topic, message, into=topics: into.add(topic), heard=heard).run()  # type: ignore[misc]
         made.append(topics)
     truth = {robot: {f"/ground_truth/{robot}/{kind}" for kind in ("odom", "pose", "path")} for robot in scenario.robots}
-    assert made[0] - made[1] == {"/surface"} | truth["follower_1"]
+    assert made[0] - made[1] == {"/surface", "/clock"} | truth["follower_1"]
     assert made[1] - made[2] == truth["leader"]
 
 
