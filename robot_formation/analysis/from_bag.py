@@ -34,7 +34,7 @@ _LOGGED = (names.DISPLACEMENT, names.RESIDUAL, names.COMMANDED)
 _MOTIONS = (names.MOVED, names.DISPLACEMENT, names.RESIDUAL, names.PREDICTION)
 
 
-class TruePoses(NamedTuple):
+class GroundTruth(NamedTuple):
     """A robot's ground truth, in the order in which it was told.
 
     Attributes:
@@ -120,7 +120,7 @@ def record_of(
     messages: Mapping[str, Sequence[Message]],
     details: Mapping[str, str],
     stamps: Mapping[str, Sequence[int]] | None = None,
-    truth: Mapping[str, TruePoses] | None = None,
+    truth: Mapping[str, GroundTruth] | None = None,
 ) -> RunRecord:
     """Return a run's record made from its messages by absolute topic, in order; whoever read them, rosbags or ROS.
 
@@ -136,7 +136,7 @@ def record_of(
     markers = messages[names.SURFACE.of()]
     if truth is None:
         odometry = {robot: messages[names.ground_truth_odom(robot).of()] for robot in robots}
-        truth = {robot: _true_poses(found) for robot, found in odometry.items() if found}
+        truth = {robot: _ground_truth(found) for robot, found in odometry.items() if found}
     latest_ns = [_last_stamp_ns(messages), *(int(poses.stamps_ns[-1]) for poses in truth.values())]
     record = RunRecord(
         leader_moved=_stamped(messages[names.MOVED.of(names.LEADER)]),
@@ -284,19 +284,19 @@ def _yaw(quaternion: Message) -> float:
     return yaw_rad((quaternion.x, quaternion.y, quaternion.z, quaternion.w))
 
 
-def _true_poses(messages: Sequence[Message]) -> TruePoses:
+def _ground_truth(messages: Sequence[Message]) -> GroundTruth:
     """Take the stamps and poses out of Odometry messages, at least one."""
     if isinstance(messages, Odometry):
-        return TruePoses(messages.stamps_ns, messages.positions_m, messages.orientations)
+        return GroundTruth(messages.stamps_ns, messages.positions_m, messages.orientations)
     poses = [message.pose.pose for message in messages]
-    return TruePoses(
+    return GroundTruth(
         np.array([_stamp_ns(message) for message in messages], dtype=np.int64),
         np.array([_place(pose.position) for pose in poses]),
         np.array([(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w) for pose in poses]),
     )
 
 
-def _track(poses: TruePoses) -> Track:
+def _track(poses: GroundTruth) -> Track:
     """Turn poses into a true path, in order of their stamps."""
     order = np.argsort(poses.stamps_ns, kind="stable")
     yaws = np.array([yaw_rad(turn) for turn in poses.orientations.tolist()])
@@ -307,7 +307,7 @@ def _track(poses: TruePoses) -> Track:
 def _overhead(
     robots: Sequence[str],
     messages: Mapping[str, Sequence[Message]],
-    truth: Mapping[str, TruePoses],
+    truth: Mapping[str, GroundTruth],
     dot_height_m: float,
 ) -> dict[str, OverheadTrack]:
     """Compare where the tracker saw each robot's dot with the dot's true places.

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from robot_formation import exit_codes, names
-from robot_formation.analysis.from_bag import TruePoses, record_of, run_topics
+from robot_formation.analysis.from_bag import GroundTruth, record_of, run_topics
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.bag.run_details import slots_text
 from robot_formation.experiment.in_process import InProcessRun
@@ -88,14 +88,14 @@ def run_with_details(
         run.heard = wanted
     code, reason = run.run()
     outcome = {"outcome": OUTCOMES.get(code, "incomplete")}
-    truth = {robot: _true_poses(events) for robot, events in poses.items() if events}
+    truth = {robot: _ground_truth(events) for robot, events in poses.items() if events}
     record = record_of(scenario.robots, messages, {**details, **outcome}, stamps, truth)
     return record, RunResult(code, None, reason, run.warnings)
 
 
-def _true_poses(events: Sequence[RobotPose]) -> TruePoses:
+def _ground_truth(events: Sequence[RobotPose]) -> GroundTruth:
     """Gather a robot's poses as ground-truth odometry tells them."""
-    return TruePoses(
+    return GroundTruth(
         np.array([event.stamp_ns for event in events], dtype=np.int64),
         np.array([event.state.pose.position for event in events]),
         np.array([event.state.pose.orientation for event in events]),
