@@ -93,7 +93,8 @@ class Recording:
         """
         cls = KINDS[kind].parameter_class()
         recorded = self._parameters.get(kind) or node_defaults(kind)
-        known = {name: value for name, value in recorded.items() if name in specs(cls)}
+        present = specs(cls)
+        known = {name: value for name, value in recorded.items() if name in present}
         self.notes += [f"{kind}.{name} is no parameter any more" for name in recorded if name not in known]
         return from_mapping(cls, {**known, **changes}, where=kind)
 

@@ -131,9 +131,8 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
         ParameterError: on an unknown name, a wrong type or a value out of range.
     """
     where = node.get_fully_qualified_name()
-    known: dict[str, Spec] = {}
-    for cls in classes:
-        known.update(specs(cls))
+    own = {cls: specs(cls) for cls in classes}
+    known: dict[str, Spec] = {name: spec for found in own.values() for name, spec in found.items()}
     overrides = {name: item for name, item in node._parameter_overrides.items() if not name.startswith(_OF_RCLPY)}
     given = todays_names(overrides, where=where)
     for name in given:
@@ -141,8 +140,8 @@ def declare(node: ParameterNode, *classes: type, fixed: Mapping[str, str]) -> li
             raise ParameterError(f"{where}: {no_parameter(name, known)}")
     values = {name: _plain(known[name], item.value) for name, item in given.items()}
     objects: list[Any] = []
-    for cls in classes:
-        objects.append(from_mapping(cls, {n: v for n, v in values.items() if n in specs(cls)}, where=where))
+    for cls, found in own.items():
+        objects.append(from_mapping(cls, {n: v for n, v in values.items() if n in found}, where=where))
     node.fixed = reasons(known, fixed)
     for name, spec in known.items():
         override = values.get(name, spec.plain_default())
