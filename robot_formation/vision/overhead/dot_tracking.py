@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from robot_formation.parameters import Choice, parameter
 from robot_formation.surface import Surface
+from robot_formation.vision.overhead.assignment import assign
 from robot_formation.vision.overhead.camera_calibration import Calibration, ImperfectCalibration, Locator
 from robot_formation.vision.overhead.dots import find_dots
 
@@ -88,9 +89,6 @@ class OverheadTracker:
         self, parameters: OverheadTrackingParameters, surface: Surface, starts: Mapping[str, tuple[float, float]]
     ) -> None:
         """Begin with robots' starts: base_link's (x, y) in the world, metres, by name."""
-        # Takes 0.3 s: not when the module is imported, for who reads the parameters only; nor at the first picture.
-        import scipy.optimize  # noqa: F401
-
         self.configure(parameters, surface, starts)
         self.tracks: dict[str, DotTrack] = {}
         self.restarted = False
@@ -162,20 +160,3 @@ class OverheadTracker:
 def _squares(expected: Array, places: Array) -> Array:
     """Squared distances (n, m) in x, y of places (n, 3) and (m, 3)."""
     return np.asarray(np.sum((expected[:, None, :2] - places[None, :, :2]) ** 2, axis=2))
-
-
-def assign(costs: Array, limit: float) -> list[int | None]:
-    """Pair rows with columns at the least total cost; a pair dearer than `limit` stays apart, at that price.
-
-    Args:
-        costs: (rows, columns), may be without columns.
-        limit: price of a row without column.
-
-    Returns:
-        Each row's column, or None.
-    """
-    from scipy.optimize import linear_sum_assignment
-
-    rows, columns = costs.shape
-    table = np.hstack([np.where(costs > limit, 1e6 * limit, costs), np.full((rows, rows), limit)])
-    return [int(column) if column < columns else None for column in linear_sum_assignment(table)[1]]

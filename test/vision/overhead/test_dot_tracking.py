@@ -1,6 +1,5 @@
-"""From dots in pictures to robots: places, assignment, identities through contact, cover and the picture's edge."""
+"""From dots in pictures to robots: places, identities through contact, cover and the picture's edge."""
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -11,12 +10,11 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
 from robot_formation.vision.overhead.camera_calibration import Calibration, ImperfectCalibration, Locator
-from robot_formation.vision.overhead.dot_tracking import OverheadTracker, OverheadTrackingParameters, assign
+from robot_formation.vision.overhead.dot_tracking import OverheadTracker, OverheadTrackingParameters
 from robot_formation.vision.overhead.dots import find_dots
 from robot_formation.world.overhead import OverheadCamera
 from robot_formation.world.parameters import WorldParameters
@@ -126,31 +124,6 @@ def test_the_imperfect_calibration_errs_by_centimetres_as_the_papers() -> None:
     dots = np.array([np.array(pose.position) + pose.matrix() @ [0.0, 0.0, 0.216] for pose in grid])
     errors = np.linalg.norm(locator.places(camera.project(dots))[:, :2] - dots[:, :2], axis=1)
     assert 0.01 < errors.max() < 0.027
-
-
-# --- assignment ---------------------------------------------------------------------------------------------------
-
-
-@given(
-    st.tuples(st.integers(1, 4), st.integers(0, 4)).flatmap(
-        lambda shape: arrays(float, shape, elements=st.floats(0, 2))
-    )
-)
-@settings(max_examples=60, deadline=None)
-def test_the_assignment_is_the_cheapest_of_all(costs: Array) -> None:
-    rows, columns = costs.shape
-    found = assign(costs, 1.0)
-    taken = [column for column in found if column is not None]
-    assert len(set(taken)) == len(taken)
-    assert all(column is None or costs[row, column] <= 1.0 for row, column in enumerate(found))
-    paid = sum(1.0 if column is None else costs[row, column] for row, column in enumerate(found))
-
-    def price(row: int, column: int) -> float:
-        return 1.0 if column >= columns else costs[row, column] if costs[row, column] <= 1.0 else math.inf
-
-    choices = itertools.permutations(range(columns + rows), rows)
-    best = min(sum(price(row, column) for row, column in enumerate(choice)) for choice in choices)
-    assert paid == pytest.approx(best, abs=1e-9)
 
 
 # --- identities ---------------------------------------------------------------------------------------------------
