@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-import yaml
-
 from robot_formation.bag.qos import TopicQos
 
 VERSION = 9
@@ -106,11 +104,6 @@ def _file(name: str, message_count: int, span: Span) -> dict[str, object]:
         "duration": times["duration"],
         "message_count": message_count,
     }
-
-
-def to_yaml(value: object) -> str:
-    """Write YAML in the given key order."""
-    return yaml.safe_dump(value, sort_keys=False, default_flow_style=False)
 
 
 def _topic(topic: TopicSummary) -> dict[str, object]:

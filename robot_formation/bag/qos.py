@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import yaml
-
 from robot_formation.bag.errors import BagError
 from robot_formation.errors import shown
 from robot_formation.json_values import Json
 from robot_formation.names import Qos
-from robot_formation.system.yaml_files import YamlError, parse_yaml
+from robot_formation.system.yaml_files import YamlError, parse_yaml, yaml_text
 
 INFINITE_NS = 2**63 - 1
 """RMW_DURATION_INFINITE in nanoseconds: what a publisher without deadline, lifespan or lease reports."""
@@ -79,7 +77,7 @@ class TopicQos:
 
 def dump_profiles(profiles: Sequence[TopicQos]) -> str:
     """Return the YAML text that rosbag2 keeps in an MCAP channel's `offered_qos_profiles`."""
-    return yaml.safe_dump([profile.to_mapping() for profile in profiles], sort_keys=False).strip()
+    return yaml_text([profile.to_mapping() for profile in profiles]).strip()
 
 
 def parse_profiles(text: str) -> tuple[TopicQos, ...]:

@@ -13,8 +13,9 @@ from robot_formation.bag.bag_path import PARTIAL_SUFFIX, check_free, recover_hin
 from robot_formation.bag.definitions import Definition, definition
 from robot_formation.bag.errors import BagError
 from robot_formation.bag.mcap_file import CHUNK_BYTES, COMPRESSIONS, McapFile
-from robot_formation.bag.metadata import bag_information, merged, to_yaml
+from robot_formation.bag.metadata import bag_information, merged
 from robot_formation.bag.qos import TopicQos
+from robot_formation.system.yaml_files import yaml_text
 
 _LAST_STAMP_NS = 2**63 - 1
 
@@ -217,7 +218,7 @@ class BagWriter:
         if self.path.exists():
             raise BagError(f"{self.path} was made by somebody else meanwhile; the bag stays in {self.partial_path}")
         with self._system_errors():
-            text = to_yaml({"rosbag2_bagfile_information": self._information(self._finished)})
+            text = yaml_text({"rosbag2_bagfile_information": self._information(self._finished)})
             (self.partial_path / "metadata.yaml").write_text(text, encoding="utf-8")
             self.partial_path.rename(self.path)
         return self.path
@@ -260,7 +261,7 @@ class BagWriter:
 
     def _finish_file(self) -> None:
         # rosbag2 looks up in this record which version the channels' QoS text follows.
-        self._file.write_metadata("rosbag2", {"serialized_metadata": to_yaml(self._information([self._file]))})
+        self._file.write_metadata("rosbag2", {"serialized_metadata": yaml_text(self._information([self._file]))})
         self._file.finish()
         self._finished.append(self._file)
 

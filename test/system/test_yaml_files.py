@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from robot_formation.errors import MOST_CHARACTERS, FormationError, shown
 from robot_formation.experiment.scenario import load, load_track, override
 from robot_formation.system.files import open_file, read_file, whole_lines
-from robot_formation.system.yaml_files import YamlError, parse_yaml, read_yaml
+from robot_formation.system.yaml_files import YamlError, parse_yaml, read_yaml, yaml_text
 
 BOMB = "a: &b0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"b{n}: &b{n} [{', '.join([f'*b{n - 1}'] * 10)}]\n" for n in range(1, 10)
@@ -63,6 +63,19 @@ def test_what_is_wrong_is_told_with_its_line(text: str, problem: str, line: int)
 )
 def test_plain_yaml_is_read_as_it_always_was(text: str) -> None:
     assert parse_yaml(text) == parse_yaml(text.encode()) == yaml.safe_load(text)
+
+
+_SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=120)
+
+
+@given(st.recursive(_SCALARS, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=10))
+def test_values_are_written_so_that_they_are_read_as_they_were(value: object) -> None:
+    assert yaml.safe_load(yaml_text(value)) == value
+
+
+def test_keys_are_written_in_their_order_or_sorted() -> None:
+    assert yaml_text({"b": [1, 2.5], "a": {}}) == "b:\n- 1\n- 2.5\na: {}\n"
+    assert yaml_text({"b": 1, "a": True}, sort_keys=True) == "a: true\nb: 1\n"
 
 
 @given(st.text(alphabet="ab01.:-_*&!<>{}[],'\"\n |%@?#~", max_size=40))
