@@ -16,6 +16,8 @@ Message: TypeAlias = Any
 """A ROS message: ROS generates the classes, and they carry no types."""
 
 LEADER = "leader"
+RECORDER = "recorder"
+"""Name of the node that writes the bag."""
 PROGRESS = "progress"
 """Name of the node that tells the progress of a launched run."""
 VIEWER = "viewer"

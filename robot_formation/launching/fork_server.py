@@ -12,6 +12,7 @@ import contextlib
 import ctypes
 import gc
 import importlib
+import inspect
 import json
 import os
 import select
@@ -36,7 +37,10 @@ _PR_GET_CHILD_SUBREAPER = 37
 _ADOPTION_S = 5.0
 _END_S = 2.0
 _POLL_S = 0.1
-_COMMON = ("robot_formation.nodes.executables", "robot_formation.nodes.host.component_node")
+_COMMON = (
+    "robot_formation.nodes.executables",
+    "robot_formation.nodes.host.component_node",
+)
 """Modules that all nodes need; what only some need is imported before the first of these is forked."""
 _RECORDER = "robot_formation.nodes.recorder.recorder_node"
 ANSWER_S = 60.0
@@ -158,9 +162,15 @@ def serve(requests: BinaryIO, answers: BinaryIO, launcher: int) -> int:
     """
     for name in _COMMON:
         importlib.import_module(name)
+    from robot_formation.nodes.host.type_supports import load_type_supports
+
+    load_type_supports()
     for line in requests:
         request = json.loads(line)
         _import_own(request["executable"])
+        # rclpy looks up in whose file something is logged, in a list of all modules' files: made here, it is not made
+        # in each node (26 ms).
+        inspect.getmodule(serve.__code__)
         gc.freeze()  # what is imported stays shared: collections in the nodes don't write to it
         middle = os.fork()
         if middle == 0:

@@ -24,11 +24,11 @@ from robot_formation.launching.child import Child
 from robot_formation.launching.environment import joining, node_environment
 from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
 from robot_formation.launching.outcome import holds_still, recorder_failed, verdict
-from robot_formation.launching.processes import RECORDER, Process, processes, viewer
+from robot_formation.launching.processes import Process, processes, viewer
 from robot_formation.launching.view_announcement import Announcement
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
 from robot_formation.leader.paths import Teleop
-from robot_formation.names import ONLOOKERS
+from robot_formation.names import ONLOOKERS, RECORDER
 from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.network.shared_memory import clean_after_graph
 from robot_formation.schedule.schedules import Spacing

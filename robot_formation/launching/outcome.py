@@ -6,8 +6,7 @@ import signal
 from dataclasses import dataclass, field
 
 from robot_formation import exit_codes
-from robot_formation.launching.processes import RECORDER
-from robot_formation.names import ONLOOKERS, PROGRESS
+from robot_formation.names import ONLOOKERS, PROGRESS, RECORDER
 
 _MISSING = "a node that was to be started elsewhere is missing or gone: progress has said which"
 _WORDS = {exit_codes.DONE: "done", exit_codes.LOST: "lost", exit_codes.INTERRUPTED: "interrupted"}

@@ -7,8 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from robot_formation import names
 from robot_formation.bag.provenance import versions
 from robot_formation.bag.run_details import slots_text
@@ -18,11 +16,11 @@ from robot_formation.calibration.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.experiment.stand_ins import TIMEOUT_S
 from robot_formation.json_values import Json, JsonObject
+from robot_formation.names import RECORDER
 from robot_formation.parameters import to_mapping
 from robot_formation.schedule.schedules import Spacing
 from robot_formation.system.git_commit import git_commit
-
-RECORDER = "recorder"
+from robot_formation.system.yaml_files import yaml_text
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,8 @@ class Process:
     def write_parameters(self, folder: Path) -> Path:
         """Write the parameters as a ROS parameter file for a node of any name; return the file."""
         file = folder / f"{self.stem}.yaml"
-        file.write_text(yaml.safe_dump({"/**": {"ros__parameters": self.ros_parameters()}}), encoding="utf-8")
+        text = yaml_text({"/**": {"ros__parameters": self.ros_parameters()}}, sort_keys=True)
+        file.write_text(text, encoding="utf-8")
         return file
 
     @property

@@ -5,6 +5,11 @@ from __future__ import annotations
 from rclpy.context import Context
 from rclpy.executors import Executor, SingleThreadedExecutor
 
+try:
+    from rclpy.experimental.events_executor import EventsExecutor
+except ImportError:
+    EventsExecutor = None  # type: ignore[assignment, misc]
+
 
 def make_executor(context: Context | None = None) -> Executor:
     """Make rclpy's event-driven executor where this rclpy has it, else the stock single-threaded one.
@@ -12,9 +17,7 @@ def make_executor(context: Context | None = None) -> Executor:
     The stock one builds a wait set of all entities for every callback; the event-driven one costs about an eighth
     (bench/executors.py), which decides how fast a run of small messages goes.
     """
-    try:
-        from rclpy.experimental.events_executor import EventsExecutor
-    except ImportError:
+    if EventsExecutor is None:
         return SingleThreadedExecutor(context=context)
     executor: Executor = EventsExecutor(context=context)
     return executor
