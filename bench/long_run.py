@@ -13,17 +13,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import re
 import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
+from graph_memory import graph_mb
 from robot_formation.experiment import scenario as scenarios
 from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import Scenario
@@ -48,31 +46,6 @@ def resident_mb() -> float:
     """Return the resident set of this process."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * resource.getpagesize() / 1e6
-
-
-def descendants(pid: int) -> Iterator[int]:
-    """Yield a process's children and theirs."""
-    children: list[int] = []
-    with suppress(OSError):  # the process has ended
-        for task in Path(f"/proc/{pid}/task").glob("*/children"):
-            with suppress(OSError):  # the thread has ended
-                children += map(int, task.read_text(encoding="ascii").split())
-    for child in children:
-        yield child
-        yield from descendants(child)
-
-
-def graph_mb() -> float:
-    """Return the proportional set size of all processes that this one has started."""
-    total_kb = 0
-    for pid in set(descendants(os.getpid())):
-        try:
-            text = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii")
-        except OSError:
-            continue  # it has ended
-        if found := re.search(r"^Pss:\s+(\d+) kB", text, re.MULTILINE):
-            total_kb += int(found[1])
-    return total_kb / 1e3
 
 
 class Watch:

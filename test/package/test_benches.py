@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import all as all_benches
-import long_run
+import graph_memory
 from comparison import Comparison, as_json, from_json, markdown
 from repository import ROOT
 
@@ -61,9 +61,9 @@ def test_a_misspelt_bench_is_named() -> None:
 
 def test_memory_is_that_of_all_descendants_and_a_process_that_has_ended_has_none() -> None:
     child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
-    assert child.pid in long_run.descendants(os.getpid())
+    assert child.pid in graph_memory.descendants(os.getpid())
     child.communicate(b"\n")
-    assert list(long_run.descendants(child.pid)) == []
+    assert list(graph_memory.descendants(child.pid)) == []
 
 
 def test_a_thread_that_ends_while_its_children_are_read_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,4 +71,4 @@ def test_a_thread_that_ends_while_its_children_are_read_is_left_out(monkeypatch:
         raise ProcessLookupError
 
     monkeypatch.setattr(Path, "read_text", ended)
-    assert list(long_run.descendants(os.getpid())) == []
+    assert list(graph_memory.descendants(os.getpid())) == []
