@@ -165,7 +165,7 @@ class WorldComponent(Component):
             text = robot_description(name, self._parameters, camera=name in self._cameras)
             self._send(names.robot_description(name), conversions.string(text))
         self._overhead.announce(self._send, now)
-        self._send(self._clock, conversions.clock(now))
+        self._tell_time()
         for name in self._parameters.robots:
             self._publish(RobotPose(name, now, self._world.ground_truth(name), final=True))
         self._overhead.look(self._world, self._send)
@@ -195,11 +195,14 @@ class WorldComponent(Component):
 
     def _tell(self, events: list[Event]) -> None:
         self.stamp_ns = self._world.stamp_ns
-        if self.wanted(self._clock):
-            self._send(self._clock, conversions.clock(self.stamp_ns))
+        self._tell_time()
         for event in events:
             self._publish(event)
         self._overhead.after(events, self._world, self._send)
+
+    def _tell_time(self) -> None:
+        if self.wanted(self._clock):
+            self._send(self._clock, conversions.clock(self.stamp_ns))
 
     def close(self) -> None:
         """See `Component`."""
