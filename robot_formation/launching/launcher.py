@@ -19,6 +19,7 @@ from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult, joined_reasons
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.experiment.stand_ins import LEADER_NODE, TIMEOUT_S, StandIns, how_to_start
+from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import joining, node_environment
 from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
@@ -38,8 +39,6 @@ if TYPE_CHECKING:
     from robot_formation.nodes.progress.monitor import Monitor
 
 _POLL_S = 0.05
-_END_POLL_S = 0.005
-"""How often it is looked whether a node has ended when the last timestep is done, or nodes were asked to end."""
 _A_PERSONS_PATIENCE_S = 86400.0
 """A leader that a person drives may stand for a day."""
 _REMIND_S = 15.0  # without a line of progress
@@ -111,18 +110,17 @@ class Launcher:
             domain = stack.enter_context(DomainReservation())
             # Those of every domain: also what a run left whose launcher was killed itself.
             stack.callback(clean_after_graph, domain)
-            monitoring = stack.enter_context(contextlib.ExitStack())
             result = RunResult(exit_codes.NODE_DIED, self.bag)
             began = time.monotonic()
             try:
                 environment = node_environment(domain, folder)
                 if self.scenario.leader.path == Teleop.name:
                     self._tell(_how_to_drive(domain))
-                result.exit_code, result.reason = self._drive(folder, environment, result, monitoring)
+                result.exit_code, result.reason = self._drive(folder, environment, result)
             finally:
                 ended = time.monotonic()
                 result.running_s = ended - began - result.startup_s
-                self._stop(monitoring.close)
+                self._stop()
                 result.stopping_s = time.monotonic() - ended
                 result.usage = {child.name: child.usage for child in self._children if child.usage}
                 result.warnings = [text for child in self._children for text in child.warnings()]
@@ -135,13 +133,8 @@ class Launcher:
                 return
             self._children.append(Child(process, folder, server, lambda: bool(self._signals.count)))
 
-    def _drive(
-        self, folder: Path, environment: dict[str, str], result: RunResult, monitoring: contextlib.ExitStack
-    ) -> tuple[int, str]:
-        """Start the nodes and follow the run until something ends it; return the exit code and why.
-
-        The monitor, which joins the graph here, leaves it with `monitoring`.
-        """
+    def _drive(self, folder: Path, environment: dict[str, str], result: RunResult) -> tuple[int, str]:
+        """Start the nodes and follow the run until something ends it; return the exit code and why."""
         table = processes(self.scenario, self.bag, images=self.images, options=self.options, stand_ins=self.stand_ins)
         elsewhere = [process for process in table if process.stand_in]
         table = [process for process in table if not process.stand_in]
@@ -152,22 +145,23 @@ class Launcher:
         self._tell(f"starting {len(table)} nodes ...")
         began = time.monotonic()
         progress = self._progress(lambda: time.monotonic() - began)
-        try:
-            # Two processes import ROS at the same time: that of the nodes, and this one.
-            with ForkServer(environment, folder / "fork_server.log") as server:
-                from robot_formation.nodes.progress.monitor import Monitor  # needs the environment of the wheels
+        with contextlib.ExitStack() as stack:
+            try:
+                # Two processes import ROS at the same time: that of the nodes, and this one.
+                with ForkServer(environment, folder / "fork_server.log") as server:
+                    from robot_formation.nodes.progress.monitor import Monitor  # needs the environment of the wheels
 
-                # The monitor joins first: the nodes then know of it before they send anything.
-                monitor = monitoring.enter_context(Monitor(environment, progress.topics, progress.listen))
-                self._start(table, folder, server)
-        except NodeNotStartedError as error:
-            interrupted = bool(self._signals.count)
-            return (exit_codes.INTERRUPTED, "interrupted") if interrupted else (exit_codes.NODE_DIED, str(error))
-        stand_ins = self._wait_for(elsewhere, folder, environment)
-        code, reason = self._follow(monitor, progress, stand_ins, announcement, began, result)
-        if code == exit_codes.DONE:
-            stand_ins.run_done()
-        return code, reason
+                    # The monitor joins first: the nodes then know of it before they send anything.
+                    monitor = stack.enter_context(Monitor(environment, progress.topics, progress.listen))
+                    self._start(table, folder, server)
+            except NodeNotStartedError as error:
+                interrupted = bool(self._signals.count)
+                return (exit_codes.INTERRUPTED, "interrupted") if interrupted else (exit_codes.NODE_DIED, str(error))
+            stand_ins = self._wait_for(elsewhere, folder, environment)
+            code, reason = self._follow(monitor, progress, stand_ins, announcement, began, result)
+            if code == exit_codes.DONE:
+                stand_ins.run_done()
+            return code, reason
 
     def _follow(
         self,
@@ -181,7 +175,7 @@ class Launcher:
         """Follow the run until something ends it; return the exit code and why."""
         watchdog = Watchdog([child.name for child in self._needed], idle_s=self._patience_s())
         while True:
-            monitor.spin(_END_POLL_S if progress.complete else _POLL_S)
+            monitor.spin(_POLL_S)
             if announcement is not None:
                 announcement.look()
             if monitor.messages and not result.startup_s:
@@ -293,30 +287,20 @@ class Launcher:
             return exit_codes.LOST, ended.last_words()
         return exit_codes.NODE_DIED, f"node {ended.name} {ended.death}"
 
-    def _stop(self, meanwhile: Callable[[], None]) -> None:
-        """End all nodes, the recorder last, so that it gets everything that the others still send.
-
-        Args:
-            meanwhile: called when they have been asked to end.
-        """
+    def _stop(self) -> None:
+        """End all nodes, the recorder last, so that it gets everything that the others still send."""
         recorders = [child for child in self._children if child.process.executable == RECORDER]
-        self._end([child for child in self._children if child not in recorders], _STOP_SIGNALS, meanwhile)
+        self._end([child for child in self._children if child not in recorders], _STOP_SIGNALS)
         self._end(recorders, _RECORDER_STOP_SIGNALS)
 
-    def _end(
-        self,
-        children: list[Child],
-        signals: tuple[tuple[signal.Signals, float], ...],
-        meanwhile: Callable[[], None] = lambda: None,
-    ) -> None:
+    def _end(self, children: list[Child], signals: tuple[tuple[signal.Signals, float], ...]) -> None:
         for number, patience_s in signals:
             end = time.monotonic() + patience_s
             for child in children:
                 child.signal(number)
-            meanwhile()
             interrupts = self._signals.count
             while any(child.poll() is None for child in children) and time.monotonic() < end:
-                time.sleep(_END_POLL_S)
+                time.sleep(0.01)
                 if self._signals.count > max(interrupts, 1):
                     break  # asked again: no more patience with this signal
 
@@ -350,8 +334,6 @@ class Launcher:
         if any(child.exit_code == exit_codes.BAD_INPUT for child in recorders):
             result.bag = None  # it never opened a bag: what lies there is somebody else's
             return
-        from robot_formation.launching.bag_rescue import missing_messages, rescue  # no run needs it while it goes on
-
         result.bag, problem = rescue(bag)
         if problem:
             result.warnings.append(problem)
