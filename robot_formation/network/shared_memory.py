@@ -185,12 +185,13 @@ class _Use:
         self._places: set[str] = set()  # device and inode, where names don't tell
         self._read_locks()
         for process in Path("/proc").glob("[0-9]*"):
+            own = process.name == str(os.getpid())
             with contextlib.suppress(OSError):
-                self._read_maps(process)
+                self._read_maps(process, own)
             with contextlib.suppress(OSError):
                 for descriptor in os.listdir(process / "fd"):
                     with contextlib.suppress(OSError):
-                        self._add(os.readlink(process / "fd" / descriptor))
+                        self._add(os.readlink(process / "fd" / descriptor), own)
 
     def lacks(self, names: list[str]) -> bool:
         """Return whether these files are there, and nobody uses any of them."""
@@ -204,23 +205,29 @@ class _Use:
         status = (self._folder / name).stat()
         return f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}:{status.st_ino}"
 
-    def _add(self, path: str) -> None:
-        if path.startswith(self._prefix):
-            self._names.add(path.removeprefix(self._prefix))
+    def _add(self, path: str, own: bool) -> None:
+        """Note a file that a process, which may be this one, has open or mapped.
+
+        Fast DDS keeps other processes' segments mapped for a while after the last participant has gone. In this process
+        that is no use of them: a segment's owner, which may be this process, has its lock file locked.
+        """
+        name = path.removeprefix(self._prefix)
+        match = _NAME.fullmatch(name)
+        if name != path and not (own and match and match["port"] is None and match["part"] is None):
+            self._names.add(name)
 
     def _read_locks(self) -> None:
         with contextlib.suppress(OSError):
             for line in Path("/proc/locks").read_text().splitlines():
                 self._places.update(word for word in line.split() if word.count(":") == 2)
 
-    def _read_maps(self, process: Path) -> None:
-        own = process.name == str(os.getpid())
+    def _read_maps(self, process: Path, own: bool) -> None:
         for line in (process / "maps").read_text(errors="replace").splitlines():
             place = line.find(self._prefix)
             if place < 0:
                 continue
             if not line.startswith("sem.", place + len(self._prefix)):
-                self._add(line[place:])
+                self._add(line[place:], own)
             elif not own:  # this process takes mutexes only here
                 # The mapping's name may be the one that the file had while it was made.
                 device, inode = line.split(maxsplit=5)[3:5]

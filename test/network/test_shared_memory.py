@@ -83,6 +83,38 @@ def test_a_port_without_lock_file_is_removed_unless_somebody_has_it_mapped(tmp_p
     assert clean_orphans(folder=tmp_path) == [port]
 
 
+MAPPING = """
+import mmap, sys
+with open(sys.argv[1], "r+b") as file:
+    mapped = mmap.mmap(file.fileno(), 0)
+print("up", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_dead_owners_segment_is_removed_although_this_process_has_it_mapped(tmp_path: Path) -> None:
+    make(tmp_path, SEGMENT, f"{SEGMENT}_el")
+    (tmp_path / SEGMENT).write_bytes(b"x")
+    with open(tmp_path / SEGMENT, "r+b") as file, mmap.mmap(file.fileno(), 0):
+        file.close()
+        descriptor = lock(tmp_path / f"{SEGMENT}_el")
+        assert clean_orphans(folder=tmp_path) == []
+        os.close(descriptor)
+        assert clean_orphans(folder=tmp_path) == [SEGMENT, f"{SEGMENT}_el"]
+
+
+def test_a_segment_stays_while_another_process_has_it_mapped(tmp_path: Path) -> None:
+    make(tmp_path, SEGMENT, f"{SEGMENT}_el")
+    (tmp_path / SEGMENT).write_bytes(b"x")
+    command = [sys.executable, "-c", MAPPING, str(tmp_path / SEGMENT)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"up\n"
+        assert clean_orphans(folder=tmp_path) == []
+        process.communicate()
+    assert clean_orphans(folder=tmp_path) == [SEGMENT, f"{SEGMENT}_el"]
+
+
 @pytest.fixture
 def unused_port() -> Iterator[tuple[int, str]]:
     """A port of the machine's shared memory that no process has, and its domain."""
