@@ -159,7 +159,7 @@ class _Copy:
                 self.take(record)
                 readable = stream.tell()
                 finished = isinstance(record, DataEnd)
-            if readable == 0 and not _has_magic(file):
+            if readable == 0 and not _begins_as_mcap(file):
                 raise BagError(f"{file} is not an MCAP file; there is nothing to recover")
         if not finished:
             self.complete = False
@@ -236,6 +236,7 @@ def _readable_records(stream: Any) -> Iterator[object]:
         return
 
 
-def _has_magic(file: Path) -> bool:
+def _begins_as_mcap(file: Path) -> bool:
+    """Whether a file begins as MCAP, as far as it goes: the last one of a split bag may be empty."""
     with open_file(file) as stream:
-        return stream.read(len(MAGIC)) == MAGIC
+        return MAGIC.startswith(stream.read(len(MAGIC)))

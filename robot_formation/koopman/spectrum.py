@@ -23,7 +23,7 @@ class Spectrum:
             largest element is 1. Row j applied to Psi(x) is the Koopman eigenfunction phi_j(x).
         right: V = W^-1, shape (k, k), the right eigenvectors as columns. If K is defective (has too few eigenvectors)
             it is the pseudo-inverse, and V diag(eigenvalues) W is not K.
-        condition_number: of W; large (above about 1e8) means that K is defective or nearly so.
+        condition_number: of W; large (above about 1e8, or infinite) means that K is defective or nearly so.
     """
 
     eigenvalues: NDArray[np.complex128]

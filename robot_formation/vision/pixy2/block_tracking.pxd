@@ -4,7 +4,7 @@ from robot_formation.vision.pixy2.boxes cimport Box
 
 cdef int _TICK_MASK, _OLDEST, _INDICES, _NOBODY, _LEADING, _VALID, _TRAILING
 
-cdef class Track:
+cdef class BoxTrack:
     cdef public Box box
     cdef public int index, stamp, state, age
 
@@ -14,10 +14,12 @@ cdef class Tracker:
     cdef int _next_index
     cdef list _tracks
 
-    @cython.locals(now=int, number=Py_ssize_t, owner=Py_ssize_t, owners=list, owned=list, tracks=list, track=Track)
+    @cython.locals(
+        now=int, number=Py_ssize_t, owner=Py_ssize_t, owners=list, owned=list, tracks=list, track=BoxTrack,
+    )
     cpdef step(self, list boxes, time_us)
 
-    @cython.locals(blocks=list, track=Track, box=Box, signature=object)
+    @cython.locals(blocks=list, track=BoxTrack, box=Box, signature=object)
     cpdef list answer(self, sigmap, max_blocks)
 
     @cython.locals(
@@ -27,16 +29,16 @@ cdef class Tracker:
     cdef list _assign(self, list boxes, long long limit)
 
     @cython.locals(
-        best=Py_ssize_t, lowest="long long", track=Track, rival=Track, box=Py_ssize_t, cost="long long",
+        best=Py_ssize_t, lowest="long long", track=BoxTrack, rival=BoxTrack, box=Py_ssize_t, cost="long long",
         owner=Py_ssize_t, stronger=bint,
     )
     cdef Py_ssize_t _choose(self, Py_ssize_t number, list owners, list costs) except -2
 
     @cython.locals(
-        of_signature=dict, costs=list, number=Py_ssize_t, track=Track, old=Box, new=Box, near=dict, x="long long",
+        of_signature=dict, costs=list, number=Py_ssize_t, track=BoxTrack, old=Box, new=Box, near=dict, x="long long",
         y="long long", left="long long", right="long long", top="long long", bottom="long long",
     )
     cdef list _costs(self, list boxes, long long limit)
 
     @cython.locals(elapsed=int)
-    cdef bint _update(self, Track track, Box box, int now) except -1
+    cdef bint _update(self, BoxTrack track, Box box, int now) except -1

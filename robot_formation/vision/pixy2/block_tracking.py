@@ -41,7 +41,7 @@ class ClockError(FormationError):
 
 
 @dataclass
-class Track:
+class BoxTrack:
     """A box over time.
 
     Attributes:
@@ -79,7 +79,7 @@ class Tracker:
 
     def reset(self) -> None:
         """Forget all tracks; the next frame starts the clock and the indices anew."""
-        self._tracks: list[Track] = []
+        self._tracks: list[BoxTrack] = []
         self._next_index = 0
         self._origin_us: int | None = None
         self._last_us = 0
@@ -116,7 +116,7 @@ class Tracker:
         tracks = [track for track, box in zip(self._tracks, owned, strict=True) if self._update(track, box, now)]
         for number in range(len(boxes)):
             if owners[number] == _NOBODY:
-                tracks.append(Track(boxes[number], self._next_index, now))
+                tracks.append(BoxTrack(boxes[number], self._next_index, now))
                 self._next_index = (self._next_index + 1) % _INDICES
         self._tracks = tracks
 
@@ -207,7 +207,7 @@ class Tracker:
             costs.append(near)
         return costs
 
-    def _update(self, track: Track, box: Box | None, now: int) -> bool:
+    def _update(self, track: BoxTrack, box: Box | None, now: int) -> bool:
         """Advance a track by one frame; False if it is to be removed."""
         if box is not None:
             track.box = box
