@@ -97,7 +97,9 @@ def in_process(settings: Sequence[str], folder: Path) -> dict[str, Any]:
 def median_of(rounds: Sequence[dict[str, Any]]) -> dict[str, Any]:
     def median(name: str) -> Any:
         if isinstance(rounds[0][name], dict):
-            return {node: statistics.median(r[name][node] for r in rounds) for node in rounds[0][name]}
+            # Of a process that was starting or ending when memory was at its most there is none in that round.
+            nodes = dict.fromkeys(node for r in rounds for node in r[name])
+            return {node: statistics.median(r[name].get(node, 0.0) for r in rounds) for node in nodes}
         return statistics.median(r[name] for r in rounds)
 
     return {name: median(name) for name in rounds[0]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from robot_formation.parameters import parameter
 from robot_formation.surface.base import PLATE_SIZE_M, GradientNormal
+from robot_formation.surface.paraboloid import Paraboloid
 
 
 @dataclass(frozen=True)
@@ -25,18 +27,18 @@ class Saddle(GradientNormal):
     middle_m: float = parameter(0.130, "height of the plate's middle", unit="m")
     curvature_per_m: float = parameter(0.1, "height gained along x per squared distance, lost along y", unit="1/m")
 
+    @cached_property
+    def paraboloid(self) -> Paraboloid:
+        """The same in plain numbers."""
+        return Paraboloid(0.5 * self.size_m, self.middle_m, self.curvature_per_m, -1.0)
+
     def height(self, x: float, y: float) -> float:
         """Height at (x, y), metres."""
-        middle = 0.5 * self.size_m
-        x -= middle
-        y -= middle
-        return self.middle_m + self.curvature_per_m * (x * x - y * y)
+        return self.paraboloid.height(x, y)
 
     def gradient(self, x: float, y: float) -> tuple[float, float]:
         """Slopes (dz/dx, dz/dy) at (x, y)."""
-        middle = 0.5 * self.size_m
-        double = 2.0 * self.curvature_per_m
-        return (double * (x - middle), double * (middle - y))
+        return (self.paraboloid.slope_x(x), self.paraboloid.slope_y(y))
 
     def heights(self, xs: NDArray[np.float64], ys: NDArray[np.float64]) -> NDArray[np.float64]:
         """Heights in metres at arrays of x and y."""

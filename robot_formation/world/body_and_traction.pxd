@@ -3,6 +3,7 @@
 cimport cython
 from libc cimport math
 
+from robot_formation.surface.paraboloid cimport Paraboloid
 from robot_formation.world.wheel_motor cimport Wheel
 
 cdef double HALF_ROOT
@@ -14,6 +15,7 @@ cdef class Body:
     cdef public double twist
     cdef public tuple wheels
     cdef public list encoder_angles, encoder_speeds
+    cdef Paraboloid _paraboloid
     cdef object _surface, _client, _mass_offset, _law
     cdef double _dt, _weight
     cdef tuple _v_wheel, _u_wheel
@@ -30,3 +32,5 @@ cdef class Body:
         e_x=double, e_y=double, e_z=double, per_radius=double, v_rate=double, u_rate=double,
     )
     cpdef apply_ground_forces(self)
+    cdef (double, double) _slopes(self, double x, double y) except *
+    cdef double _height(self, double x, double y) except? -1

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from robot_formation.geometry.orientation import Quaternion, Vector, rotate
 from robot_formation.surface import Surface
+from robot_formation.surface.paraboloid import Paraboloid
 from robot_formation.world.bullet import pybullet
 from robot_formation.world.events import BodyState
 from robot_formation.world.imperfections import Imperfections
@@ -72,6 +73,8 @@ class Body:
     def __init__(self, surface: Surface, parameters: WorldParameters, flaws: Imperfections, client: int) -> None:
         self.parameters = parameters
         self._surface = surface
+        # Read at C speed where there is one.
+        self._paraboloid: Paraboloid | None = getattr(surface, "paraboloid", None)
         self._client = client
         self._dt = 1.0 / parameters.physics_hz
         self._mass_offset = (flaws.mass_x_m, flaws.mass_y_m, parameters.chassis.mass_height_m)
@@ -202,7 +205,6 @@ class Body:
         stiffness, damping, grip, drag, sigma0, sigma1, relaxation, contact_radius, soft, travel = self._law
         # The last step's twist: it changes with the distance driven only.
         yielding, twist = soft * max(-travel, min(travel, self.twist)), 0.0
-        gradient, height = self._surface.gradient, self._surface.height
         (px, py, pz), (qx, qy, qz, qw) = _read_pose(body, client)
         (vx, vy, vz), (wx, wy, wz) = _read_velocity(body, client)
         # Columns of the rotation matrix: forward (f), left (l), up (u).
@@ -217,9 +219,9 @@ class Body:
             centre_y = py + f_y * wheel_x + l_y * wheel_y + u_y * wheel_z
             centre_z = pz + f_z * wheel_x + l_z * wheel_y + u_z * wheel_z
             # Contact point: the centre moved by the radius against the normal found there (two iterations).
-            slope_x, slope_y = gradient(centre_x, centre_y)
+            slope_x, slope_y = self._slopes(centre_x, centre_y)
             n_z = contact_radius / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-            slope_x, slope_y = gradient(centre_x + slope_x * n_z, centre_y + slope_y * n_z)
+            slope_x, slope_y = self._slopes(centre_x + slope_x * n_z, centre_y + slope_y * n_z)
             n_z = 1.0 / math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
             n_x, n_y = -slope_x * n_z, -slope_y * n_z
             at_x, at_y = centre_x - contact_radius * n_x, centre_y - contact_radius * n_y
@@ -228,7 +230,7 @@ class Body:
             s_x = vx + wy * arm_z - wz * arm_y
             s_y = vy + wz * arm_x - wx * arm_z
             s_z = vz + wx * arm_y - wy * arm_x
-            depth, side = (height(at_x, at_y) - at_z) * n_z, wheel.side
+            depth, side = (self._height(at_x, at_y) - at_z) * n_z, wheel.side
             twist -= side * depth
             load = stiffness * depth + side * yielding - damping * (s_x * n_x + s_y * n_y + s_z * n_z)
             if load <= 1e-9:
@@ -294,3 +296,15 @@ class Body:
         angles[0] += dt * v_rate
         angles[1] += dt * u_rate
         self.encoder_speeds = [v_rate, u_rate]
+
+    def _slopes(self, x: float, y: float) -> tuple[float, float]:
+        """The ground's slopes along the world's x and y."""
+        if self._paraboloid is None:
+            return self._surface.gradient(x, y)
+        return self._paraboloid.slope_x(x), self._paraboloid.slope_y(y)
+
+    def _height(self, x: float, y: float) -> float:
+        """The ground's height, metres."""
+        if self._paraboloid is None:
+            return self._surface.height(x, y)
+        return self._paraboloid.height(x, y)

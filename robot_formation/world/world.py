@@ -247,14 +247,16 @@ class World:
             if not (final or due):
                 continue
             stamp = self.stamp_ns
-            left = off_plate(self.surface, robot.body.pose(), self.parameters.marker.top_m)
+            state = robot.body.state()
+            left = off_plate(self.surface, state.pose, self.parameters.marker.top_m)
             if left is not None:
                 robot.hold()
+                state = robot.body.state()
                 final = True
             joints = robot.joint_states(stamp, final=final)
             if final or any(joints.velocities):
                 events.append(joints)
-            events.append(RobotPose(name, stamp, robot.body.state(), final))
+            events.append(RobotPose(name, stamp, state, final))
             if left is not None:
                 events.append(LeftPlate(name, stamp, *left))
         return events

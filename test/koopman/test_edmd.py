@@ -312,8 +312,8 @@ def check_poor_data(psi: Dictionary, how: Regularization, history: Array) -> Non
         return
     model = EDMD.fit_trajectories(psi, [history], regularization=how)
     start = history[:, : psi.history + 1]
-    for found in (model.k, model.c, model.eigenvalues, model.modes):
-        assert np.isfinite(found).all()
+    for fitted in (model.k, model.c, model.eigenvalues, model.modes):
+        assert np.isfinite(fitted).all()
     assert model.spectrum.condition_number >= 1.0  # infinite where rounding leaves a K defective
     for found in (model.eigenfunctions(start), model.predict(start, 1), model.training_errors.state):
         assert np.isfinite(found).all()
