@@ -11,10 +11,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.alignment.precise.corner_projection import (
+    CORNERS,
+    LEFT,
+    LOWER,
+    RIGHT,
+    UPPER,
+    WIDTH,
+    CornerProjection,
+    read_edges,
+)
 from robot_formation.alignment.precise.marker_edges import Edge
 from robot_formation.geometry.se2 import Motion
 from robot_formation.parameters import parameter
@@ -43,6 +55,8 @@ _CORNERS = {
     (Face.REAR, "bottom"): [0, 6],
 }
 """Numbers of the cube's corners in `MarkerModel` that are the ends of each edge."""
+_UPRIGHT = {edge: ends for edge, ends in _CORNERS.items() if edge[1] in ("left", "right")}
+_KINDS = {"left": LEFT, "right": RIGHT, "top": UPPER, "bottom": LOWER}
 _LEAST_DEPTH_M = 0.03
 """Depth at which points beside or behind the lens are taken to lie; bodies that touch leave it more than 20 cm."""
 
@@ -74,47 +88,29 @@ class MarkerModel:
         self.parameters = p = parameters
         half, low = p.marker_edge_m / 2.0, p.marker_top_m - p.marker_edge_m
         ground = ((-half, -half), (half, -half), (half, half), (-half, half))
-        self._corners = np.array([(x, y, z) for x, y in ground for z in (low, p.marker_top_m)])
-        self._lens = np.array([0.0, p.lens_y_m, p.lens_z_m])
+        self._projection = CornerProjection(
+            np.array([(x, y, z) for x, y in ground for z in (low, p.marker_top_m)]).data,
+            p.lens_y_m,
+            p.lens_z_m,
+            p.focal_length_px,
+            p.centre_x_px,
+            p.centre_y_px,
+            _LEAST_DEPTH_M,
+        )
 
     def pixels(self, states: Matrix) -> Matrix:
         """Project the cube's corners for states (n, 6); returns columns and rows, (n, 8, 2) px."""
-        p = self.parameters
-        cosine, sine = np.cos(states[:, YAW])[:, None], np.sin(states[:, YAW])[:, None]
-        cx, cy, cz = self._corners.T
-        points = np.stack([cosine * cx - sine * cy, sine * cx + cosine * cy, np.broadcast_to(cz, (len(states), 8))], -1)
-        roll, pitch = relative_tilt(states)
-        half = _tilts(0.5 * roll, 0.5 * pitch)
-        points = np.einsum("nij,nkj->nki", half, points)
-        points[:, :, :2] += states[:, None, :2]
-        points = np.einsum("nij,nkj->nki", half, points) - self._lens
-        scale = p.focal_length_px / np.maximum(points[:, :, 1], _LEAST_DEPTH_M)
-        return np.stack([p.centre_x_px + points[:, :, 0] * scale, p.centre_y_px - points[:, :, 2] * scale], -1)
+        pixels = np.empty((len(states), CORNERS, 2))
+        self._projection.project(np.ascontiguousarray(states, np.float64).data, pixels.data)
+        return pixels
 
     def edges(self, states: Matrix, edges: Sequence[Edge]) -> Matrix:
         """Predict edges for states (n, 6), (n, edges) px."""
-        pixels = self.pixels(states)
         found = np.empty((len(states), len(edges)))
-        for number, edge in enumerate(edges):
-            if edge.side == "width":
-                right, left = (pixels[:, _CORNERS[edge.face, side], 0].mean(axis=1) for side in ("right", "left"))
-                found[:, number] = right - left
-                continue
-            columns, rows = np.moveaxis(pixels[:, _CORNERS[edge.face, edge.side]], -1, 0)
-            if edge.side == "left":
-                found[:, number] = columns.min(axis=1)
-            elif edge.side == "right":
-                found[:, number] = columns.max(axis=1)
-            else:
-                found[:, number] = self._row(columns, rows, edge.side == "top")
+        corners, kinds = _reading(tuple((edge.face, edge.side) for edge in edges))
+        if edges:
+            read_edges(self.pixels(states).data, corners, kinds, self.parameters.row_inset_px, found.data)
         return found
-
-    def _row(self, columns: Matrix, rows: Matrix, top: bool) -> Vector:
-        """Upper or lower end of a face: where its slanting edge leaves enough columns for the detector."""
-        end = rows.min(axis=1) if top else rows.max(axis=1)
-        other = rows.max(axis=1) if top else rows.min(axis=1)
-        width = np.abs(columns[:, 1] - columns[:, 0])
-        return np.asarray(end + (other - end) * np.minimum(1.0, self.parameters.row_inset_px / np.maximum(width, 1.0)))
 
     def widths(self, state: Vector) -> dict[Face, float]:
         """Return how wide each face appears, px; negative if it is turned away."""
@@ -122,8 +118,9 @@ class MarkerModel:
 
     def shown(self, state: Vector, limits_px: tuple[float, float]) -> dict[Face, float]:
         """Return how much of each face's width lies between two columns, px; negative if it is turned away."""
-        columns = np.clip(self.pixels(state[None])[0, :, 0], *limits_px)
-        middle = {edge: float(columns[corners].mean()) for edge, corners in _CORNERS.items()}
+        low, high = limits_px
+        columns = [min(max(column, low), high) for column in self.pixels(state[None])[0, :, 0].tolist()]
+        middle = {edge: 0.5 * sum(columns[corner] for corner in ends) for edge, ends in _UPRIGHT.items()}
         return {face: middle[face, "right"] - middle[face, "left"] for face in Face}
 
     def place(self, face: Face, column_px: float, height_px: float, yaw: float) -> Vector:
@@ -148,13 +145,19 @@ def relative_tilt(states: Matrix) -> tuple[Vector, Vector]:
     return (mean + more) * y + mixed * x, -((mean - more) * x + mixed * y)
 
 
-def _tilts(roll: Vector, pitch: Vector) -> Matrix:
-    """Rotations (n, 3, 3) by small tilts about x and y."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    zero = np.zeros_like(roll)
-    return np.stack(
-        [np.stack([cp, sp * sr, sp * cr], -1), np.stack([zero, cr, -sr], -1), np.stack([-sp, cp * sr, cp * cr], -1)], 1
-    )
+@lru_cache(maxsize=1024)
+def _reading(edges: tuple[tuple[Face, str], ...]) -> tuple[memoryview[Any], memoryview[Any]]:
+    """Corners and kinds of edges as `read_edges` takes them."""
+    corners = np.zeros((len(edges), 4), np.intp)
+    kinds = np.empty(len(edges), np.intp)
+    for number, (face, side) in enumerate(edges):
+        if side == "width":
+            corners[number] = [*_CORNERS[face, "right"], *_CORNERS[face, "left"]]
+            kinds[number] = WIDTH
+        else:
+            corners[number, :2] = _CORNERS[face, side]
+            kinds[number] = _KINDS[side]
+    return corners.data, kinds.data
 
 
 def after_motion(state: Vector, motion: Motion) -> Vector:
