@@ -33,6 +33,7 @@ class McapFile:
     def __init__(self, path: Path, *, compression: str) -> None:
         self.path = path
         self.open_bytes = 0
+        self.message_count = 0
         self.span = Span()
         self.summaries: dict[str, TopicSummary] = {}
         self._channels: dict[str, int] = {}
@@ -50,11 +51,6 @@ class McapFile:
         """Size of the file so far; the open chunk doesn't count."""
         return self._stream.tell()
 
-    @property
-    def message_count(self) -> int:
-        """Messages written so far."""
-        return sum(summary.message_count for summary in self.summaries.values())
-
     def add_topic(self, name: str, what: Definition, profiles: tuple[TopicQos, ...]) -> None:
         """Declare a topic."""
         if what.type_name not in self._schemas:
@@ -70,6 +66,7 @@ class McapFile:
         self._mcap.add_message(self._channels[topic], log_time_ns, cdr, publish_time_ns, summary.message_count)
         self.open_bytes += len(cdr) + _MESSAGE_OVERHEAD_BYTES
         summary.message_count += 1
+        self.message_count += 1
         self.span.include(log_time_ns)
 
     def end_chunk(self) -> None:
