@@ -2,6 +2,7 @@
 the modules that have a .pxd file beside them. The rest is in pyproject.toml.
 """
 
+import os
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -39,6 +40,7 @@ class CompileHotLoops(build_ext):  # type: ignore[misc]
     def finalize_options(self) -> None:
         self.distribution.ext_modules = self._translated()
         super().finalize_options()
+        self.parallel = self.parallel or len(os.sched_getaffinity(0))
 
     def _translated(self) -> list[Extension]:
         try:
