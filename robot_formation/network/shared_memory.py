@@ -55,7 +55,9 @@ def fast_dds_files(folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
     return groups
 
 
-def find_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> dict[str, list[str]]:
+def find_orphans(
+    domain: int | None = None, folder: Path = SHARED_MEMORY, *, own_ports: bool = True
+) -> dict[str, list[str]]:
     """List the groups of files whose owners are all dead; removes nothing. Arguments as for clean_orphans.
 
     Processes of other containers that share the folder are not seen here; their locks are, while files are removed.
@@ -63,11 +65,11 @@ def find_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> dic
     groups = {group: names for group, names in fast_dds_files(folder).items() if _is_of_domain(group, domain)}
     if not groups:
         return {}
-    use = _Use(folder)
+    use = _Use(folder, own_ports=own_ports)
     return {group: names for group, names in groups.items() if use.lacks(names)}
 
 
-def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> list[str]:
+def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY, *, own_ports: bool = True) -> list[str]:
     """Remove the files whose owners are dead, and never a living process' files.
 
     A port is removed under its mutex, so that it is not half open: a process that had just opened a dead one's port
@@ -79,12 +81,14 @@ def clean_orphans(domain: int | None = None, folder: Path = SHARED_MEMORY) -> li
         domain: Leave the ports of other domains alone. Segments, and the ports below 7400, carry no domain in their
             name and are removed in any case. None: every domain.
         folder: Where shared memory lies.
+        own_ports: Whether a port is in use that this process has mapped and nobody has locked. False where this process
+            has no participant any more: Fast DDS keeps for a while what it has sent to.
 
     Returns:
         The names of the removed files. Files that this user may not remove are passed over.
     """
     removed: list[str] = []
-    for group in find_orphans(domain, folder):
+    for group in find_orphans(domain, folder, own_ports=own_ports):
         if folder != SHARED_MEMORY or "port" not in group:
             removed += _remove_unlocked(group, folder)
             continue
@@ -107,7 +111,7 @@ def _taken(port: str) -> Iterator[None]:
             stack.close()
             time.sleep(_MUTEX_LOOK_S)
         else:
-            if not _Use(SHARED_MEMORY).lacks([f"sem.{port}_mutex"]):
+            if not _Use(SHARED_MEMORY, own_ports=True).lacks([f"sem.{port}_mutex"]):
                 raise BlockingIOError(f"{port} is being opened")
         yield
 
@@ -119,8 +123,8 @@ def clean_after_graph(domain: int) -> None:
         ports = {f"fastrtps_port{port}" for port in domain_ports(domain)}
         if ports.isdisjoint(fast_dds_files()):
             return
+        clean_orphans(domain, own_ports=False)
         time.sleep(_ROUND_S)
-        clean_orphans(domain)
 
 
 def _remove_unlocked(group: str, folder: Path) -> list[str]:
@@ -178,8 +182,8 @@ class _Use:
     try locks would make those fail who want them at that moment.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, *, own_ports: bool) -> None:
+        self._folder, self._own_ports = folder, own_ports
         self._prefix = f"{folder}/"
         self._names: set[str] = set()
         self._places: set[str] = set()  # device and inode, where names don't tell
@@ -213,7 +217,8 @@ class _Use:
         """
         name = path.removeprefix(self._prefix)
         match = _NAME.fullmatch(name)
-        if name != path and not (own and match and match["port"] is None and match["part"] is None):
+        unused = own and match and match["part"] is None and (match["port"] is None or not self._own_ports)
+        if name != path and not unused:
             self._names.add(name)
 
     def _read_locks(self) -> None:

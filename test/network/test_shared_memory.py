@@ -83,6 +83,19 @@ def test_a_port_without_lock_file_is_removed_unless_somebody_has_it_mapped(tmp_p
     assert clean_orphans(folder=tmp_path) == [port]
 
 
+def test_a_port_that_this_process_has_sent_to_is_removed_once_it_has_no_participant(tmp_path: Path) -> None:
+    port = "fastrtps_port7413"
+    make(tmp_path, port, f"{port}_el")
+    (tmp_path / port).write_bytes(b"x")
+    with open(tmp_path / port, "r+b") as file, mmap.mmap(file.fileno(), 0):
+        file.close()
+        descriptor = lock(tmp_path / f"{port}_el")
+        assert clean_orphans(folder=tmp_path, own_ports=False) == []
+        os.close(descriptor)
+        assert clean_orphans(folder=tmp_path) == []
+        assert clean_orphans(folder=tmp_path, own_ports=False) == [port, f"{port}_el"]
+
+
 MAPPING = """
 import mmap, sys
 with open(sys.argv[1], "r+b") as file:
@@ -147,7 +160,7 @@ def test_a_port_that_a_process_is_opening_stays(unused_port: tuple[int, str], mo
         names = [port, f"{port}_el", f"sem.{port}_mutex"]
         assert fast_dds_files()[port] == names
         with monkeypatch.context() as patch:  # it began just after its files had been looked at
-            patch.setattr(shared_memory, "find_orphans", lambda *_: {port: names})
+            patch.setattr(shared_memory, "find_orphans", lambda *_, **__: {port: names})
             assert clean_orphans(domain) == []
         process.communicate("go on\n")
     clean_orphans(domain)
