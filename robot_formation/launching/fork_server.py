@@ -37,10 +37,7 @@ _PR_GET_CHILD_SUBREAPER = 37
 _ADOPTION_S = 5.0
 _END_S = 2.0
 _POLL_S = 0.1
-_COMMON = (
-    "robot_formation.nodes.executables",
-    "robot_formation.nodes.host.component_node",
-)
+_COMMON = ("robot_formation.nodes.executables", "robot_formation.nodes.host.component_node")
 """Modules that all nodes need; what only some need is imported before the first of these is forked."""
 _RECORDER = "robot_formation.nodes.recorder.recorder_node"
 ANSWER_S = 60.0
