@@ -3,6 +3,7 @@ the modules that have a .pxd file beside them. The rest is in pyproject.toml.
 """
 
 import os
+from importlib.util import find_spec
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -38,17 +39,15 @@ class CompileHotLoops(build_ext):  # type: ignore[misc]
     """Translates the hot loops to C and compiles them; what that takes may be missing."""
 
     def finalize_options(self) -> None:
-        self.distribution.ext_modules = self._translated()
+        if self.distribution.ext_modules:
+            self.distribution.ext_modules = self._translated()
         super().finalize_options()
-        self.parallel = self.parallel or len(os.sched_getaffinity(0))
+        self.parallel = len(os.sched_getaffinity(0))
 
     def _translated(self) -> list[Extension]:
-        try:
-            from Cython.Build import cythonize
-            from Cython.Compiler.Errors import CompileError
-        except ImportError:
-            self.warn("hot loops are not compiled: there is no Cython")
-            return []
+        from Cython.Build import cythonize
+        from Cython.Compiler.Errors import CompileError
+
         try:
             translated: list[Extension] = cythonize(
                 hot_loops(),
@@ -75,7 +74,7 @@ class CompileHotLoops(build_ext):  # type: ignore[misc]
 setup(
     license="Apache-2.0",
     python_requires=">=3.10",
-    ext_modules=hot_loops(),
+    ext_modules=hot_loops() if find_spec("Cython") else [],
     cmdclass={"build_ext": CompileHotLoops},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
