@@ -106,18 +106,32 @@ def test_sigkill_at_any_of_ten_moments(tmp_path: Path, split_bytes: int) -> None
     """A recorder is stopped instead and its files are copied: they are what a kill at this moment would leave."""
     process = start(tmp_path / "run", split_bytes)
     told, before = 0, 0
-    for lines in sorted(moments(10, seed=2 + split_bytes)):
-        process.send_signal(signal.SIGCONT)
-        for _ in range(lines - before):
-            told = int(line_of(process))
-        process.send_signal(signal.SIGSTOP)
-        os.waitid(os.P_PID, process.pid, os.WSTOPPED)
-        folder = tmp_path / f"after_{lines}"
-        shutil.copytree(tmp_path / "run.partial", folder / "run.partial")
-        check_recovery(folder, told)
-        before = lines
+    try:
+        for lines in sorted(moments(10, seed=2 + split_bytes)):
+            process.send_signal(signal.SIGCONT)
+            for _ in range(lines - before):
+                told = int(line_of(process))
+            process.send_signal(signal.SIGSTOP)
+            os.waitid(os.P_PID, process.pid, os.WSTOPPED)
+            folder = tmp_path / f"after_{lines}"
+            shutil.copytree(tmp_path / "run.partial", folder / "run.partial")
+            check_recovery(folder, told)
+            before = lines
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_split_bag_whose_last_file_is_still_empty_is_recovered(tmp_path: Path) -> None:
+    process = start(tmp_path / "run", 20_000)
+    for _ in range(40):
+        told = int(line_of(process))
     process.kill()
     process.communicate()
+    files = list((tmp_path / "run.partial").glob("*.mcap"))
+    assert len(files) > 1
+    (tmp_path / "run.partial" / f"run_{len(files)}.mcap").touch()
+    check_recovery(tmp_path, told)
 
 
 def test_a_bag_that_is_being_written_is_known_from_one_whose_writer_is_dead(tmp_path: Path) -> None:
