@@ -17,7 +17,7 @@ from robot_formation.experiment.in_process import run_in_process
 from robot_formation.experiment.scenario import load_track, override
 from robot_formation.launching.processes import run_metadata
 from robot_formation.surface import make_surface
-from robot_formation.vision.overhead.dot_tracking import UsedCalibration
+from robot_formation.vision.overhead.tracking_parameters import UsedCalibration
 from robot_formation.world.overhead import OverheadCamera
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import pose_on_surface

@@ -14,7 +14,6 @@ from robot_formation.bag.metadata import Span, TopicSummary
 from robot_formation.bag.qos import TopicQos, dump_profiles
 
 COMPRESSIONS = {"zstd": CompressionType.ZSTD, "lz4": CompressionType.LZ4, "none": CompressionType.NONE}
-CHUNK_BYTES = 1 << 20
 _MESSAGE_OVERHEAD_BYTES = 31  # opcode, length, channel, sequence and two times of a message record
 _NEVER_BYTES = 1 << 62
 

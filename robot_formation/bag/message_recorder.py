@@ -10,7 +10,8 @@ from robot_formation import names
 from robot_formation.bag.definitions import Definition, jazzy_typestore
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.transforms import Transforms
-from robot_formation.bag.writer import DEFAULT_OPTIONS, BagWriter, WriteOptions
+from robot_formation.bag.write_options import DEFAULT_OPTIONS, WriteOptions
+from robot_formation.bag.writer import BagWriter
 
 _TIME_FIRST = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
 METADATA_NAME = "robot_formation"

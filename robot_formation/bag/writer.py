@@ -12,32 +12,13 @@ from types import TracebackType
 from robot_formation.bag.bag_path import PARTIAL_SUFFIX, check_free, recover_hint
 from robot_formation.bag.definitions import Definition, definition
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.mcap_file import CHUNK_BYTES, COMPRESSIONS, McapFile
+from robot_formation.bag.mcap_file import COMPRESSIONS, McapFile
 from robot_formation.bag.metadata import bag_information, merged
 from robot_formation.bag.qos import TopicQos
+from robot_formation.bag.write_options import DEFAULT_OPTIONS, WriteOptions
 from robot_formation.system.yaml_files import yaml_text
 
 _LAST_STAMP_NS = 2**63 - 1
-
-
-@dataclass(frozen=True)
-class WriteOptions:
-    """How a bag's files are written.
-
-    Attributes:
-        compression: of the chunks: `zstd`, `lz4` or `none`.
-        chunk_bytes: a chunk that holds so much is ended before the next message.
-        split_bytes: a new file is begun when the present one is larger; 0: never.
-        split_ns: a new file is begun when the log times in the present one span more, nanoseconds; 0: never.
-    """
-
-    compression: str = "zstd"
-    chunk_bytes: int = CHUNK_BYTES
-    split_bytes: int = 0
-    split_ns: int = 0
-
-
-DEFAULT_OPTIONS = WriteOptions()
 
 
 @dataclass

@@ -23,7 +23,7 @@ from robot_formation.follower.fine_tuning import LookParameters
 from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.detector import BlockDetector
-from robot_formation.vision.pixy2.picture import scaled
+from robot_formation.vision.pixy2.scaling import scaled
 from robot_formation.world.camera import Camera
 from robot_formation.world.pose import Pose
 from robot_formation.world.sensor import Sensor

@@ -14,10 +14,10 @@ from robot_formation.errors import FormationError
 from robot_formation.json_values import JsonObject
 
 if TYPE_CHECKING:
-    from robot_formation.vision.aruco_detector import BlockSensor
     from robot_formation.vision.pixy2.block import Block
     from robot_formation.vision.pixy2.parameters import DetectorParameters
     from robot_formation.vision.pixy2.picture import Picture
+    from robot_formation.vision.sensors import BlockSensor
 
 DESCRIPTION = """\
 Find the blocks of taught colours in images, as a Pixy2 does, or, with --sensor tags, the faces of a marker of tags.

@@ -200,7 +200,7 @@ def reserve(args: argparse.Namespace, scenario: Scenario) -> PathReservation:
 
 def execute(args: argparse.Namespace, scenario: Scenario, place: PathReservation) -> RunResult:
     """Run the scenario in the way that the options ask for."""
-    from robot_formation.bag.writer import WriteOptions
+    from robot_formation.bag.write_options import WriteOptions
     from robot_formation.calibration.camera_check import describe_camera
     from robot_formation.calibration.drive_check import describe_curves
     from robot_formation.experiment.overhead_defaults import LARGEST_M

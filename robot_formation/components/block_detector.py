@@ -14,13 +14,14 @@ from robot_formation import conversions, names
 from robot_formation.components.base import Component, Input, Place
 from robot_formation.components.node_parameters import BlockDetectorNodeParameters
 from robot_formation.names import Message
-from robot_formation.vision.aruco_detector import BlockSensor, TagDetector
+from robot_formation.vision.aruco_detector import TagDetector
 from robot_formation.vision.marker import MarkerKind
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.detector import BlockDetector
-from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, Picture, scaled
-from robot_formation.vision.sensors import is_outside_sensor, outside_sensor
+from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, Picture
+from robot_formation.vision.pixy2.scaling import scaled
+from robot_formation.vision.sensors import BlockSensor, is_outside_sensor, outside_sensor
 
 _RATE_FRAMES = 31
 _WHITE = (255, 255, 255)

@@ -11,12 +11,12 @@ from robot_formation.parameters import ParameterError, parameter
 from robot_formation.paths import config_dir
 from robot_formation.schedule.schedules import Schedule, Spacing, check_spacing, period_parameter
 from robot_formation.surface import SURFACES, Surface, surface_from_texts
-from robot_formation.vision.aruco_detector import TagParameters
 from robot_formation.vision.marker import MarkerKind
-from robot_formation.vision.overhead.dot_tracking import OverheadTrackingParameters
+from robot_formation.vision.overhead.tracking_parameters import OverheadTrackingParameters
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.signatures import Signature, load_signatures
 from robot_formation.vision.sensors import SENSORS, is_outside_sensor
+from robot_formation.vision.tag_parameters import TagParameters
 from robot_formation.world.checks import check_setup
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pushes import Push, check_push, read_push

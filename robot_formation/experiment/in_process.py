@@ -18,7 +18,7 @@ from typing import TypeVar
 from robot_formation import conversions, exit_codes
 from robot_formation.bag.bag_path import PathReservation, check_free
 from robot_formation.bag.message_recorder import Recorder
-from robot_formation.bag.writer import DEFAULT_OPTIONS, WriteOptions
+from robot_formation.bag.write_options import DEFAULT_OPTIONS, WriteOptions
 from robot_formation.components.base import Component, Handler, Place
 from robot_formation.components.catalogue import NodeKind
 from robot_formation.components.world import WorldComponent

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from robot_formation.surface.base import PLATE_SIZE_M
-from robot_formation.vision.overhead.camera_calibration import Calibration, ImperfectCalibration
 from robot_formation.vision.overhead.lens import OverheadLens
+from robot_formation.vision.overhead.tracking_parameters import Calibration, ImperfectCalibration
 from robot_formation.world.parameters import OverheadParameters
 
 LARGEST_M = 7.0

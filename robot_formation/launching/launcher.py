@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING
 from robot_formation import exit_codes
 from robot_formation.bag.bag_path import PARTIAL_SUFFIX, PathReservation, check_free, recover_hint
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.writer import DEFAULT_OPTIONS, WriteOptions
+from robot_formation.bag.write_options import DEFAULT_OPTIONS, WriteOptions
 from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunError, RunResult, joined_reasons
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.experiment.stand_ins import LEADER_NODE, TIMEOUT_S, StandIns, how_to_start
-from robot_formation.launching.bag_rescue import missing_messages, rescue
 from robot_formation.launching.child import Child
 from robot_formation.launching.environment import joining, node_environment
 from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
@@ -334,6 +333,8 @@ class Launcher:
         if any(child.exit_code == exit_codes.BAD_INPUT for child in recorders):
             result.bag = None  # it never opened a bag: what lies there is somebody else's
             return
+        from robot_formation.launching.bag_rescue import missing_messages, rescue  # needs memory that nodes have now
+
         result.bag, problem = rescue(bag)
         if problem:
             result.warnings.append(problem)

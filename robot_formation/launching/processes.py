@@ -10,7 +10,7 @@ from pathlib import Path
 from robot_formation import names
 from robot_formation.bag.provenance import versions
 from robot_formation.bag.run_details import slots_text
-from robot_formation.bag.writer import DEFAULT_OPTIONS, WriteOptions
+from robot_formation.bag.write_options import DEFAULT_OPTIONS, WriteOptions
 from robot_formation.calibration.camera_check import camera_values
 from robot_formation.calibration.drive_check import robot_curves
 from robot_formation.experiment.scenario import Scenario

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,6 +52,8 @@ def _read_png(path: Path, content: bytes) -> NDArray[np.uint16]:
             f"height map {path}: the PNG has {head.depth} bits and colour type {head.colour}; "
             "save it as 16-bit greyscale (8 bits would be steps, not slopes)"
         )
+    import cv2  # not above: who only names a surface needs no OpenCV, which takes 7 MB
+
     usable = is_whole(content) and unpacks_within(content, head.data_bytes)
     picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if usable else None
     if picture is None or picture.shape != (head.height, head.width) or picture.dtype != np.uint16:

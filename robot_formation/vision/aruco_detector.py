@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robot_formation.parameters import parameter
 from robot_formation.vision.aruco_patterns import MODULES, QUIET_MODULES, dictionary
 from robot_formation.vision.marker import Face
 from robot_formation.vision.pixy2.block import Block
@@ -17,62 +15,13 @@ from robot_formation.vision.pixy2.block_tracking import ALL_BLOCKS, ALL_SIGNATUR
 from robot_formation.vision.pixy2.boxes import Box
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import WIDTH, checked
+from robot_formation.vision.tag_parameters import TagParameters
 
 Points = NDArray[np.float32]
 
 _CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], np.float32)
 _SQUARE: Points = _CORNERS * np.float32(0.5 * MODULES)
 _FACE: Points = _CORNERS * np.float32(0.5 * MODULES + QUIET_MODULES)
-
-
-@dataclass(frozen=True)
-class TagParameters:
-    """What a user tunes on the search for tags; descriptions name OpenCV's parameters where they have one."""
-
-    enlargement: int = parameter(
-        2, "Pictures are enlarged so many times before the search: small tags need it", low=1, high=4
-    )
-    min_perimeter_px: float = parameter(
-        32.0, "Shortest outline of a dark square that is looked at", unit="px", low=8.0, high=1000.0
-    )
-    window_px: int = parameter(
-        11,
-        "adaptiveThreshWinSizeMin and Max: window that tells dark from light; one is enough, and others cost time",
-        unit="enlarged px",
-        low=3,
-        high=101,
-    )
-    threshold_constant: float = parameter(
-        10.0,
-        "adaptiveThreshConstant: how much darker than its surroundings dark is",
-        unit="levels",
-        low=0.0,
-        high=100.0,
-    )
-    polygon_accuracy: float = parameter(
-        0.03,
-        "polygonalApproxAccuracyRate: how straight the square's sides must be, by its outline",
-        low=0.005,
-        high=0.2,
-    )
-    error_correction: float = parameter(
-        0.6, "errorCorrectionRate: share of the wrong bits that the dictionary could correct", low=0.0, high=1.0
-    )
-
-
-class BlockSensor(Protocol):
-    """What turns pictures into tracked blocks: signatures 1, 2 and 3 are the Target, Front and Rear faces."""
-
-    def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
-        """Process the next frame, RGB (208, 316, 3) uint8 at a time in microseconds, and report the tracked blocks.
-
-        Raises:
-            PictureError: if the picture has another shape or type.
-            ClockError: if the time is not later than the previous frame's.
-        """
-
-    def reset(self) -> None:
-        """Forget all tracked blocks."""
 
 
 class TagDetector:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 from numpy.typing import ArrayLike
 
 from robot_formation import plugins
-from robot_formation.vision.aruco_detector import BlockSensor
 from robot_formation.vision.marker import MarkerKind
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ALL_BLOCKS, ALL_SIGNATURES, Tracker
@@ -22,6 +21,21 @@ SENSORS = {
     MarkerKind.TAGS.value: "the ArUco tags of a marker of that kind",
 }
 """What each of the package's own is, in a line."""
+
+
+class BlockSensor(Protocol):
+    """What turns pictures into tracked blocks: signatures 1, 2 and 3 are the Target, Front and Rear faces."""
+
+    def process(self, picture: ArrayLike, time_us: int) -> list[Block]:
+        """Process the next frame, RGB (208, 316, 3) uint8 at a time in microseconds, and report the tracked blocks.
+
+        Raises:
+            PictureError: if the picture has another shape or type.
+            ClockError: if the time is not later than the previous frame's.
+        """
+
+    def reset(self) -> None:
+        """Forget all tracked blocks."""
 
 
 class OutsideSensor:

@@ -26,7 +26,7 @@ from robot_formation.bag.errors import BagError
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.message_recorder import Recorder
 from robot_formation.bag.recording_queue import RecordingQueue
-from robot_formation.bag.writer import WriteOptions
+from robot_formation.bag.write_options import WriteOptions
 
 split_bytes = int(sys.argv[2])
 recorder = Recorder(Path(sys.argv[1]), {"seed": "3"}, WriteOptions(chunk_bytes=20000, split_bytes=split_bytes))

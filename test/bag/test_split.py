@@ -13,7 +13,8 @@ from robot_formation.bag.info import bag_info
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.reader import read_bag
 from robot_formation.bag.recover import recover
-from robot_formation.bag.writer import BagWriter, WriteOptions
+from robot_formation.bag.write_options import WriteOptions
+from robot_formation.bag.writer import BagWriter
 from synthetic_bag import STORE, text
 
 STRING = "std_msgs/msg/String"

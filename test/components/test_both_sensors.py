@@ -19,11 +19,11 @@ from robot_formation.experiment.scenario import load, load_track, override
 from robot_formation.parameters import ParameterError, flatten, from_mapping
 from robot_formation.paths import config_dir
 from robot_formation.surface import make_surface
-from robot_formation.vision.aruco_detector import BlockSensor
 from robot_formation.vision.marker import Face, MarkerKind
 from robot_formation.vision.pixy2.block import Block
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.picture import PictureError
+from robot_formation.vision.sensors import BlockSensor
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import pose_on_surface

@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from robot_formation.surface import Surface, make_surface
 from robot_formation.vision import aruco_patterns
-from robot_formation.vision.aruco_detector import TagDetector, TagParameters
+from robot_formation.vision.aruco_detector import TagDetector
 from robot_formation.vision.aruco_patterns import MODULES, QUIET_MODULES, TagError, pattern
 from robot_formation.vision.marker import Face, MarkerKind
 from robot_formation.vision.pixy2.block_tracking import ClockError
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import PictureError
+from robot_formation.vision.tag_parameters import TagParameters
 from robot_formation.world.camera import Camera
 from robot_formation.world.parameters import MarkerParameters, WorldParameters
 from robot_formation.world.pose import pose_on_surface

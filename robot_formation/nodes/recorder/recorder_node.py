@@ -20,12 +20,11 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from robot_formation import conversions, exit_codes, names
 from robot_formation.bag.definitions import definition
 from robot_formation.bag.errors import BagError
-from robot_formation.bag.mcap_file import CHUNK_BYTES
 from robot_formation.bag.message_recorder import Recorder
 from robot_formation.bag.recording_queue import QUEUE_BYTES, RecordingQueue
 from robot_formation.bag.selection import Selection
 from robot_formation.bag.transforms import Transforms, made_in
-from robot_formation.bag.writer import WriteOptions
+from robot_formation.bag.write_options import CHUNK_BYTES, WriteOptions
 from robot_formation.names import Message
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.ros_parameters import HostParameters, ParameterNode, declare

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.parameters import parameter
 from robot_formation.surface import Surface
-from robot_formation.vision.overhead.lens import OverheadLens
+from robot_formation.vision.overhead.tracking_parameters import Calibration
 
 Array = NDArray[np.float64]
 
@@ -19,42 +17,6 @@ _ROUNDS = 20
 _CLOSE_M = 1e-6
 _STANCE_DIRECTIONS = [(math.cos(math.pi * k / 4), math.sin(math.pi * k / 4)) for k in range(8)]
 _UNDISTORT_STOP = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-9)
-
-
-@dataclass(frozen=True)
-class Calibration(OverheadLens):
-    """What a calibration holds: lens and place of the camera, and what is taken for the ground.
-
-    The defaults are the true values of the simulated camera: the good calibration.
-    """
-
-    knows_surface: bool = parameter(True, "true: robots stand on the surface; false: on a level plane")
-    plane_m: float = parameter(0.0, "height of that plane", unit="m", low=-10.0, high=10.0)
-    stance_m: float = parameter(
-        0.145,
-        "distance of the wheels from base_link: how far a robot's origin hangs above a hollow",
-        unit="m",
-        low=0.0,
-        high=2.0,
-    )
-
-
-@dataclass(frozen=True)
-class ImperfectCalibration(Calibration):
-    """A calibration as the paper's must have been: distortion only partly known, and the plate taken for level."""
-
-    centre_x_px: float = parameter(
-        255.5, "column of the optical axis: the picture's middle", unit="px", low=-1e4, high=1e4
-    )
-    centre_y_px: float = parameter(
-        255.5, "row of the optical axis: the picture's middle", unit="px", low=-1e4, high=1e4
-    )
-    k1: float = parameter(-0.09, "radial distortion, second order", low=-1.0, high=1.0)
-    k2: float = parameter(0.0, "radial distortion, fourth order", low=-1.0, high=1.0)
-    p1: float = parameter(0.0, "tangential distortion along rows", low=-0.1, high=0.1)
-    p2: float = parameter(0.0, "tangential distortion along columns", low=-0.1, high=0.1)
-    knows_surface: bool = parameter(False, "true: robots stand on the surface; false: on a level plane")
-    plane_m: float = parameter(0.1, "height of that plane", unit="m", low=-10.0, high=10.0)
 
 
 def _undistorted(points: Array, matrix: Array, distortion: Array) -> Array:

@@ -8,44 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_formation.parameters import Choice, parameter
 from robot_formation.surface import Surface
 from robot_formation.vision.overhead.assignment import assign
-from robot_formation.vision.overhead.camera_calibration import Calibration, ImperfectCalibration, Locator
+from robot_formation.vision.overhead.camera_calibration import Locator
 from robot_formation.vision.overhead.dots import find_dots
+from robot_formation.vision.overhead.tracking_parameters import OverheadTrackingParameters
 
 Array = NDArray[np.float64]
-
-
-class UsedCalibration(Choice):
-    """Which of the tracker's two calibrations is used."""
-
-    GOOD = "good"
-    IMPERFECT = "imperfect"
-
-
-@dataclass(frozen=True)
-class OverheadTrackingParameters:
-    """The tracker's calibrations, and how it follows dots."""
-
-    calibration: UsedCalibration = parameter(UsedCalibration.GOOD, "which of the two calibrations is used")
-    dot_height_m: float = parameter(0.216, "height of the dot above base_link", unit="m", low=0.0, high=2.0)
-    dot_radius_m: float = parameter(0.015, "radius of the dot", unit="m", low=0.001, high=0.2)
-    threshold: int = parameter(150, "8-bit level between the dots and everything else", low=1, high=254)
-    gate_m: float = parameter(
-        0.25,
-        "farthest place from the expected one at which a dot is still the same robot's",
-        unit="m",
-        low=0.01,
-        high=10.0,
-    )
-    velocity_gain: float = parameter(0.4, "weight of the last displacement in the expected one", low=0.0, high=1.0)
-    good: Calibration = Calibration()
-    imperfect: ImperfectCalibration = ImperfectCalibration()
-
-    def chosen(self) -> Calibration:
-        """Return the calibration in use."""
-        return self.good if self.calibration is UsedCalibration.GOOD else self.imperfect
 
 
 @dataclass

@@ -11,7 +11,7 @@ import numpy as np
 
 from robot_formation.vision.pixy2.parameters import SIGNATURES
 from robot_formation.vision.pixy2.picture import HEIGHT
-from robot_formation.vision.pixy2.scanner import Segments
+from robot_formation.vision.pixy2.segments import Segments
 
 _COLUMNS = 256
 """More than a picture has columns."""

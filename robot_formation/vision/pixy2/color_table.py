@@ -91,11 +91,12 @@ def _above(bound: int) -> float:
     return (bound + 1 - 1 / 4096 if bound >= 0 else bound) / (1 << SCALE_BITS)
 
 
+_Int16 = npt.NDArray[np.int16]
 _Int32 = npt.NDArray[np.int32]
 
 
 @functools.cache
-def _colors() -> tuple[_Int32, _Int32, _Int32, _Int32]:
+def _colors() -> tuple[_Int32, _Int32, _Int16, _Int16]:
     """Chroma u and v, sum and table index of every fourth level of r, g and b, each of shape (262144,)."""
     r, g, b = (axis.ravel() for axis in np.meshgrid(*[np.arange(0, 256, 4, dtype=np.int32)] * 3, indexing="ij"))
     total = r + g + b
@@ -103,4 +104,4 @@ def _colors() -> tuple[_Int32, _Int32, _Int32, _Int32]:
     u = ((r - g << SCALE_BITS) / divisor).astype(np.int32)
     v = ((b - g << SCALE_BITS) / divisor).astype(np.int32)
     bins = (r - g >> 3) * STRIDE + (b - g >> 3)
-    return u, v, total, bins
+    return u, v, total.astype(np.int16), bins.astype(np.int16)

@@ -14,7 +14,8 @@ from robot_formation.vision.pixy2.codes import with_codes
 from robot_formation.vision.pixy2.color_table import ColorTable, is_code
 from robot_formation.vision.pixy2.parameters import DetectorParameters
 from robot_formation.vision.pixy2.picture import checked
-from robot_formation.vision.pixy2.scanner import Scanner, Segments
+from robot_formation.vision.pixy2.scanner import Scanner
+from robot_formation.vision.pixy2.segments import Segments
 from robot_formation.vision.pixy2.signatures import Signature, sorted_unique
 
 _MIXED = 3

@@ -21,7 +21,8 @@ from robot_formation.system.png_files import png_head, unpacks_within
 from robot_formation.system.standard_error import diverted_stderr
 from robot_formation.system.yaml_files import read_yaml
 from robot_formation.vision.pixy2.parameters import SIGNATURES, DetectorParameters
-from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, Picture, PictureError, same_shape, scaled
+from robot_formation.vision.pixy2.picture import HEIGHT, WIDTH, Picture, PictureError
+from robot_formation.vision.pixy2.scaling import same_shape, scaled
 
 CAMERA_PARAMETERS = {
     "camera_brightness",

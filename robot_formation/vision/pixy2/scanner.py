@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from typing import cast
 
 import cv2
 import numpy as np
@@ -10,16 +10,8 @@ import numpy as np
 from robot_formation.vision.pixy2.color_table import STRIDE, ColorTable
 from robot_formation.vision.pixy2.picture import CELLS, HEIGHT, Picture
 from robot_formation.vision.pixy2.runs import MOST_SEGMENTS, find_segments
+from robot_formation.vision.pixy2.segments import Segments
 from robot_formation.vision.pixy2.teaching import IntArray
-
-
-class Segments(NamedTuple):
-    """Row segments in the order of the scan, each array of shape (n,): a segment covers cells start..end inclusive."""
-
-    signature: IntArray
-    row: IntArray
-    start: IntArray
-    end: IntArray
 
 
 class Scanner:

@@ -13,9 +13,14 @@ from hypothesis import strategies as st
 
 from robot_formation.parameters import from_mapping
 from robot_formation.surface import make_surface
-from robot_formation.vision.overhead.camera_calibration import Calibration, ImperfectCalibration, Locator
-from robot_formation.vision.overhead.dot_tracking import OverheadTracker, OverheadTrackingParameters
+from robot_formation.vision.overhead.camera_calibration import Locator
+from robot_formation.vision.overhead.dot_tracking import OverheadTracker
 from robot_formation.vision.overhead.dots import find_dots
+from robot_formation.vision.overhead.tracking_parameters import (
+    Calibration,
+    ImperfectCalibration,
+    OverheadTrackingParameters,
+)
 from robot_formation.world.overhead import OverheadCamera
 from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import pose_on_surface

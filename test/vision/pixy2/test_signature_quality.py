@@ -18,7 +18,7 @@ from robot_formation.vision.pixy2.color_table import ColorTable
 from robot_formation.vision.pixy2.detector import BlockDetector
 from robot_formation.vision.pixy2.matches import matching_signatures
 from robot_formation.vision.pixy2.parameters import DetectorParameters
-from robot_formation.vision.pixy2.picture import scaled
+from robot_formation.vision.pixy2.scaling import scaled
 from robot_formation.vision.pixy2.scanner import Scanner
 from robot_formation.vision.pixy2.signature_quality import LEAST_LEVELS, shortcomings
 from robot_formation.vision.pixy2.signatures import Signature, save_signatures, teach_point, teach_region
