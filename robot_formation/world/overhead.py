@@ -66,8 +66,7 @@ class OverheadCamera:
         self._size = p.width_px * p.height_px
         self._widest = 2.0 * math.hypot(p.width_px, p.height_px) / p.focal_length_px
         self._gamma = parameters.camera.gamma
-        self._plate = self._empty_plate(p.floor_albedo / 255.0)
-        self._canvas = self._plate.copy()
+        self._canvas = self._empty_plate(p.floor_albedo / 255.0)
         self._picture = self._sampled(self._canvas)
         self._drawn: dict[Pose, _Outlines] = {}
         drawn = generator(seed, "overhead", "camera").standard_normal(2 * self._size, dtype=np.float32)
@@ -122,8 +121,9 @@ class OverheadCamera:
         # The blur at the part's edge needs pixels beyond it.
         x, y = max(0, left - _BLUR_REACH_PX), max(0, top - _BLUR_REACH_PX)
         part = (slice(y * s, (bottom + _BLUR_REACH_PX) * s), slice(x * s, (right + _BLUR_REACH_PX) * s))
-        self._canvas[part] = self._plate[part]
-        # On the whole canvas: OpenCV's lines depend on where they are clipped. Redrawing outside the part does nothing.
+        # A second canvas would take 4 MB: the plate under the robots is kept, and put back.
+        hidden = [(where, self._canvas[where].copy()) for where in map(self._covered, robots)]
+        # On the whole canvas: OpenCV's lines depend on where they are clipped.
         for outlines in robots:
             first = 0
             for last, level in zip(outlines.ends, outlines.levels, strict=True):
@@ -133,6 +133,18 @@ class OverheadCamera:
                 first = last
         small = self._sampled(self._canvas[part])
         self._picture[top:bottom, left:right] = small[top - y : bottom - y, left - x : right - x]
+        for where, plate in hidden:
+            self._canvas[where] = plate
+
+    def _covered(self, robot: _Outlines) -> tuple[slice, slice]:
+        """Rows and columns of the canvas that a robot's faces may cover."""
+        if not len(robot.corners_fixed):
+            return slice(0), slice(0)
+        first = (robot.corners_fixed.min(axis=0) >> SHIFT) - _MARGIN_PX
+        last = (robot.corners_fixed.max(axis=0) >> SHIFT) + _MARGIN_PX + 1
+        left, top = np.maximum(first, 0).tolist()
+        right, bottom = np.maximum(last, 0).tolist()
+        return slice(top, bottom), slice(left, right)
 
     def _empty_plate(self, floor_light: float) -> GreyPicture:
         p = self.parameters
