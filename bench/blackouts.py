@@ -151,7 +151,7 @@ def report(args: argparse.Namespace) -> int:
 
 
 def page_lines(rows: Sequence[Row]) -> list[str]:
-    """Return the page's table: the baseline's median errors / those of `formation`, by path."""
+    """Return the page's table by path: median errors of all predictors; growths of `formation` against the baseline."""
     groups: dict[str, dict[str, dict[int, Row]]] = {}
     for row in rows:
         groups.setdefault(row.path, {}).setdefault(row.predictor, {})[row.seed] = row
@@ -159,8 +159,9 @@ def page_lines(rows: Sequence[Row]) -> list[str]:
     lines = []
     for path, found in groups.items():
         base, own = found.get(BASELINE, {}), found.get(OWN, {})
+        predictors = [name for name in PREDICTORS if name in found]
         medians = [
-            " / ".join(median_cm([getattr(row, name) for row in runs.values()]) for runs in (base, own))
+            " / ".join(median_cm([getattr(row, name) for row in found[used].values()]) for used in predictors)
             for name in names
         ]
         paired = [
@@ -168,7 +169,7 @@ def page_lines(rows: Sequence[Row]) -> list[str]:
             for seed in own.keys() & base.keys()
             if own[seed].growth_3_m is not None or base[seed].growth_3_m is not None
         ]
-        again = " / ".join(str(sum(row.found_again_3 or 0 for row in runs.values())) for runs in (base, own))
+        again = " / ".join(str(sum(row.found_again_3 or 0 for row in found[used].values())) for used in predictors)
         lines.append([path, str(len(own)), *medians, cell(paired, 1.0, 2), again])
     head = ["path", "runs", *map(str, BLACKOUTS), "growth over 3", "ratio of the growths", "in place again"]
     return table(head, lines)

@@ -14,8 +14,10 @@ from robot_formation.analysis.sweep_summary import median_with_interval
 
 OWN, BASELINE = "formation", "previous+close"
 COMPARED = (BASELINE, OWN)
-OTHERS = (BASELINE, "trend+close", "edmd+close")
+OTHERS = ("previous", BASELINE, "trend+close", "edmd+close")
 """What `formation` is compared with on the page of results."""
+PAIRED = (BASELINE, "trend+close")
+"""The two without a Koopman operator that it is paired with there."""
 
 Runs = dict[tuple[str, str], dict[str, dict[int, Row]]]
 """Rows by path and surface, then predictor, then seed."""
@@ -78,7 +80,8 @@ def ratio_lines(runs: Runs, others: Sequence[str]) -> Iterator[list[str]]:
 def surface_lines(rows: Sequence[Row], surface: str) -> list[str]:
     """Return the page's table of one surface: medians of the correction distance, and paired ratios."""
     runs = grouped(rows)
-    head = ["path", "runs", "lost", *(f"`{name}`" for name in (*OTHERS, OWN)), f"/ `{BASELINE}`", "/ best of the three"]
+    head = ["path", "runs", "lost", *(f"`{name}`" for name in (*OTHERS, OWN))]
+    head += [*(f"/ `{name}`" for name in PAIRED), "/ best of the others"]
     lines = []
     for path in PATHS:
         if found := runs.get((path, surface)):
@@ -89,16 +92,32 @@ def surface_lines(rows: Sequence[Row], surface: str) -> list[str]:
 
 
 def _counts(found: Mapping[str, Mapping[int, Row]]) -> list[str]:
-    """Runs of `formation`, and lost runs of all predictors of the page."""
+    """Runs of `formation` (and fewest of another predictor, if fewer), and lost runs of all predictors of the page."""
+    own = len(found.get(OWN, {}))
+    fewest = min(len(found.get(name, {})) for name in OTHERS)
     lost = {name: lost_runs(found.get(name, {})) for name in (*OTHERS, OWN)}
     said = ", ".join(f"`{name}` {count}" for name, count in lost.items() if count)
-    return [str(len(found.get(OWN, {}))), said or "0"]
+    return [str(own) if fewest == own else f"{own} ({fewest})", said or "0"]
 
 
 def _page_ratios(found: Mapping[str, Mapping[int, Row]]) -> list[str]:
-    """Ratios to the baseline, and to the best of the others."""
+    """Ratios to the predictors without a Koopman operator, and to the best of all others."""
     best = min(OTHERS, key=lambda name: middle_rank(found.get(name, {})))
-    return [cell(ratios(found.get(OWN, {}), found.get(name, {})), 1.0, 2) for name in (BASELINE, best)]
+    return [cell(ratios(found.get(OWN, {}), found.get(name, {})), 1.0, 2) for name in (*PAIRED, best)]
+
+
+def phase_lines(rows: Sequence[Row], surface: str) -> list[str]:
+    """Return the page's table by phase of the run: medians of the baseline / those of `formation`."""
+    runs = grouped(rows)
+    spans = [phase.replace("_", " to ") if "_" in phase else f"from {phase}" for phase in PHASES]
+    head = ["path", *spans, *spans, "formation", "in the ellipse (%)", "half of the weight"]
+    lines = []
+    for path in PATHS:
+        if found := runs.get((path, surface)):
+            correction, other = [*details(found)][: len(PHASES)], [*details(found)][len(PHASES) :]
+            errors = [_compared(found, f"prediction_rmse_{phase}_m") for phase in PHASES]
+            lines.append([path, *correction, *errors, *other])
+    return table(head, lines)
 
 
 def middle_rank(runs: Mapping[int, Row]) -> float:
@@ -109,13 +128,18 @@ def middle_rank(runs: Mapping[int, Row]) -> float:
 def details(found: Mapping[str, Mapping[int, Row]]) -> Iterator[str]:
     """Yield the cells of the table by phase."""
     for phase in PHASES:
-        yield " / ".join(middle(known(found.get(name, {}), f"correction_{phase}_m"), 100.0) for name in COMPARED)
-    yield " / ".join(middle(known(found.get(name, {}), "formation_error_rmse_m"), 100.0, 2) for name in COMPARED)
+        yield _compared(found, f"correction_{phase}_m")
+    yield _compared(found, "formation_error_rmse_m", 2)
     own = found.get(OWN, {})
     shares = [known(own, f"coverage_{horizon}") for horizon in HORIZONS]
     yield " / ".join(f"{100.0 * float(np.mean(share)):.0f}" if share else "-" for share in shares)
     reached = known(own, "half_weight_timestep")
     yield f"{float(np.median(reached)):.0f} ({len(reached)} of {len(own)})" if reached else f"0 of {len(own)}"
+
+
+def _compared(found: Mapping[str, Mapping[int, Row]], name: str, digits: int = 1) -> str:
+    """Medians of a column [cm]: of the baseline / of `formation`."""
+    return " / ".join(middle(known(found.get(predictor, {}), name), 100.0, digits) for predictor in COMPARED)
 
 
 def middle(values: Sequence[float], scale: float, digits: int = 1) -> str:

@@ -84,6 +84,13 @@ def leader_path_lines(surface: str) -> list[str]:
     return leader_path_tables.surface_lines(_leader_path_rows(), surface)
 
 
+def phase_lines() -> list[str]:
+    """Return the table of leader paths by phase of the run, on the bowl."""
+    import leader_path_tables
+
+    return leader_path_tables.phase_lines(_leader_path_rows(), "bowl")
+
+
 def _leader_path_rows() -> list[leader_path_runs.Row]:
     import leader_path_runs
     from run_table import open_table
@@ -125,6 +132,7 @@ TABLES = (
     Table(PREDICTORS_PAGE, "leader_paths", partial(leader_path_lines, "bowl")),
     Table(PREDICTORS_PAGE, "leader_paths_plane", partial(leader_path_lines, "plane")),
     Table(PREDICTORS_PAGE, "leader_paths_saddle", partial(leader_path_lines, "saddle")),
+    Table(PREDICTORS_PAGE, "leader_paths_phases", phase_lines),
     Table(PREDICTORS_PAGE, "blackouts", blackout_lines),
     Table(SENSITIVITY_PAGE, "sensitivity", sensitivity_lines),
 )

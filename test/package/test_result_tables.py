@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -101,15 +102,28 @@ def path_row(surface: str, predictor: str, seed: int, correction_m: float, outco
 
 def test_leader_paths_are_compared_with_the_best_of_the_other_models_on_the_bowl() -> None:
     rows = []
-    for name, correction_m in zip((*leader_path_tables.OTHERS, "formation"), (2.0, 1.0, 0.5, 0.1), strict=True):
+    for name, correction_m in zip((*leader_path_tables.OTHERS, "formation"), (3.0, 2.0, 1.0, 0.5, 0.1), strict=True):
         rows += [path_row("bowl", name, seed, correction_m) for seed in range(3)]
         rows += [path_row("plane", name, seed, 0.3) for seed in range(3)]
     (line,) = leader_path_tables.surface_lines(rows, "bowl")[2:]
     assert line == (
-        "| circle12 | 3 | 0 | 200.0 | 100.0 | 50.0 | 10.0 (10.0..10.0) | 0.05 (0.05..0.05) | 0.20 (0.20..0.20) |"
+        "| circle12 | 3 | 0 | 300.0 | 200.0 | 100.0 | 50.0 | 10.0 (10.0..10.0) "
+        "| 0.05 (0.05..0.05) | 0.10 (0.10..0.10) | 0.20 (0.20..0.20) |"
     )
     rows.append(path_row("bowl", "formation", 3, 0.1, "leader_lost"))
-    assert "| `formation` 1 |" in leader_path_tables.surface_lines(rows, "bowl")[2]
+    assert "| 4 (3) | `formation` 1 |" in leader_path_tables.surface_lines(rows, "bowl")[2]
+
+
+def test_phases_of_the_run_show_the_baseline_beside_formation() -> None:
+    rows = [path_row("bowl", name, 0, 0.1) for name in leader_path_tables.COMPARED]
+    rows = [
+        replace(row, correction_5_10_m=0.02 * (1 + i), prediction_rmse_31_m=0.01 * (1 + i), coverage_3=0.5)
+        for i, row in enumerate(rows)
+    ]
+    (line,) = leader_path_tables.phase_lines(rows, "bowl")[2:]
+    assert line == (
+        "| circle12 | 2.0 / 4.0 | - / - | - / - | - / - | - / - | 1.0 / 2.0 | - / - | - / 50 / - | 0 of 1 |"
+    )
 
 
 def test_growths_over_a_blackout_are_paired_over_seeds() -> None:
