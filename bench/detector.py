@@ -144,7 +144,7 @@ def main() -> int:
         print(as_json(found))
         return 0
     print(f"median ratio {statistics.median(ratios):.1f}, smallest {min(ratios):.1f}")
-    table = fastest_ms(lambda: ColorTable.of(signatures, parameters), CALLS)
+    table = fastest_ms(lambda: ColorTable.built(signatures, parameters), CALLS)
     print(f"colour table, once per change: {table:.1f} ms")
     return 0
 

@@ -4,14 +4,13 @@ In both camera modes through the node graph and in one process, each several tim
 those of the project: `stream` at 10 times real time, `on_demand` at 20, in process below 1.3 seconds; 350 MB.
 
 Memory is that of all processes when the last timestep is done: of the node graph the proportional set sizes of nodes
-and launcher, which is this process; of one process its peak.
+and launcher, each run in a process of its own; of one process its peak.
 
 Run: python bench/run.py [--rounds N] [--predictor NAME] [--json]
 """
 
 import argparse
 import json
-import os
 import statistics
 import subprocess
 import sys
@@ -22,10 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from comparison import Comparison, add_comparisons, as_json
-from graph_memory import nodes_mb, set_size_mb
 from robot_formation.analysis.from_bag import load_run
-from robot_formation.experiment import scenario as scenarios
-from robot_formation.launching.launcher import Launcher
 
 AIMS = {"stream": 10.0, "on_demand": 20.0}
 START_AIM_S, END_AIM_S, IN_PROCESS_AIM_S, MEMORY_AIM_MB = 1.5, 0.3, 1.3, 350.0
@@ -42,33 +38,49 @@ sys.exit(result.exit_code)
 """
 
 
+THROUGH_THE_GRAPH = """
+import json, os, sys, time
+from pathlib import Path
+sys.path.append(sys.argv[2])
+from graph_memory import nodes_mb, set_size_mb
+from robot_formation.experiment import scenario as scenarios
+from robot_formation.launching.launcher import Launcher
+scenario = scenarios.override(scenarios.load_track("two"), sys.argv[3:])
+last, memory_mb = f"{scenario.leader.timesteps}/{scenario.leader.timesteps}", {}
+def say(text):
+    if text.startswith("timestep") and last in text:
+        memory_mb.update({**nodes_mb(), "launcher": set_size_mb(os.getpid())})
+began = time.monotonic()
+result = Launcher(scenario, Path(sys.argv[1]), say=say).run()
+wall_s = time.monotonic() - began
+processor_s = {name: usage.processor_s for name, usage in result.usage.items()}
+print(json.dumps([wall_s, result.startup_s, result.stopping_s, processor_s, memory_mb]))
+print(result.reason, file=sys.stderr)
+sys.exit(result.exit_code)
+"""
+
+
 def size_mb(bag: Path) -> float:
     return sum(path.stat().st_size for path in bag.iterdir()) / 1e6
 
 
 def through_the_graph(settings: Sequence[str], folder: Path) -> dict[str, Any]:
-    scenario = scenarios.override(scenarios.load_track("two"), settings)
     bag = folder / "bag"
-    memory_mb: dict[str, float] = {}
-
-    def say(text: str) -> None:
-        if text.startswith("timestep") and f"{scenario.leader.timesteps}/{scenario.leader.timesteps}" in text:
-            memory_mb.update({**nodes_mb(), "launcher": set_size_mb(os.getpid())})
-
-    began = time.monotonic()
-    result = Launcher(scenario, bag, say=say).run()
-    wall_s = time.monotonic() - began
-    if result.exit_code != 0:
-        raise SystemExit(f"the run ended with {result.exit_code}: {result.reason}")
+    here = Path(__file__).parent
+    command = [sys.executable, "-c", THROUGH_THE_GRAPH, bag, here, *settings]
+    completed = subprocess.run(command, capture_output=True, text=True, check=False)
+    if completed.returncode != 0:
+        raise SystemExit(f"the run ended with {completed.returncode}: {completed.stderr.strip()}")
+    wall_s, startup_s, stopping_s, usage, memory_mb = json.loads(completed.stdout)
     simulated_s = load_run(bag).simulated_s
-    processor_s = sum(usage.processor_s for usage in result.usage.values())
+    processor_s = sum(usage.values())
     return {
         "wall_s": wall_s,
-        "startup_s": result.startup_s,
-        "stopping_s": result.stopping_s,
+        "startup_s": startup_s,
+        "stopping_s": stopping_s,
         "simulated_s": simulated_s,
         "processor_s": processor_s,
-        "share": {name: usage.processor_s / processor_s for name, usage in result.usage.items()},
+        "share": {name: used_s / processor_s for name, used_s in usage.items()},
         "memory_mb": sum(memory_mb.values()),
         "memory": memory_mb,
         "bag_mb": size_mb(bag),

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import socket
+import zlib
 from itertools import count
 from pathlib import Path
 from types import TracebackType
@@ -56,9 +56,10 @@ class PathReservation:
         """
         if self._socket is not None:
             return True
-        name = hashlib.sha256(str(self.path).encode()).hexdigest()
+        # Two checksums are enough to tell paths apart; hashlib would load OpenSSL, which takes 2 MB.
+        text = str(self.path).encode()
         try:
-            self._socket = reserve(f"bag_{name}")
+            self._socket = reserve(f"bag_{zlib.crc32(text):08x}{zlib.adler32(text):08x}")
         except OSError as error:
             raise BagError(f"{self.path} can't be reserved: {error.strerror or error}") from error
         return self._socket is not None

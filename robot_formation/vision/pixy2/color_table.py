@@ -64,7 +64,12 @@ class ColorTable:
 
     @classmethod
     def of(cls, signatures: Iterable[Signature], parameters: DetectorParameters) -> ColorTable:
-        """Build the table: once per change of signatures or parameters, not per frame."""
+        """Return the table of signatures in any order; those asked for last are kept."""
+        return _kept(tuple(signatures), parameters)
+
+    @classmethod
+    def built(cls, signatures: Iterable[Signature], parameters: DetectorParameters) -> ColorTable:
+        """Build the table."""
         u, v, total, bins = _colors()
         min_sum = max(1, int(np.float32(765) * np.float32(parameters.min_brightness)))
         labels = np.zeros(STRIDE * STRIDE, np.uint8)
@@ -79,7 +84,14 @@ class ColorTable:
             labels[bins[inside]] = signature.sig
             low[:, signature.sig] = [_above(bound) for bound in (u_min, v_min)]
             high[:, signature.sig] = [-_above(-bound) for bound in (u_max, v_max)]
+        for array in (labels, low, high):
+            array.setflags(write=False)
         return cls(labels, low, high, min_sum)
+
+
+@functools.lru_cache(maxsize=8)
+def _kept(signatures: tuple[Signature, ...], parameters: DetectorParameters) -> ColorTable:
+    return ColorTable.built(signatures, parameters)
 
 
 def _above(bound: int) -> float:
@@ -91,12 +103,10 @@ def _above(bound: int) -> float:
     return (bound + 1 - 1 / 4096 if bound >= 0 else bound) / (1 << SCALE_BITS)
 
 
-_Int16 = npt.NDArray[np.int16]
 _Int32 = npt.NDArray[np.int32]
 
 
-@functools.cache
-def _colors() -> tuple[_Int32, _Int32, _Int16, _Int16]:
+def _colors() -> tuple[_Int32, _Int32, _Int32, _Int32]:
     """Chroma u and v, sum and table index of every fourth level of r, g and b, each of shape (262144,)."""
     r, g, b = (axis.ravel() for axis in np.meshgrid(*[np.arange(0, 256, 4, dtype=np.int32)] * 3, indexing="ij"))
     total = r + g + b
@@ -104,4 +114,4 @@ def _colors() -> tuple[_Int32, _Int32, _Int16, _Int16]:
     u = ((r - g << SCALE_BITS) / divisor).astype(np.int32)
     v = ((b - g << SCALE_BITS) / divisor).astype(np.int32)
     bins = (r - g >> 3) * STRIDE + (b - g >> 3)
-    return u, v, total.astype(np.int16), bins.astype(np.int16)
+    return u, v, total, bins
