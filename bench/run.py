@@ -67,7 +67,7 @@ def size_mb(bag: Path) -> float:
 def through_the_graph(settings: Sequence[str], folder: Path) -> dict[str, Any]:
     bag = folder / "bag"
     here = Path(__file__).parent
-    command = [sys.executable, "-c", THROUGH_THE_GRAPH, bag, here, *settings]
+    command = [sys.executable, "-c", THROUGH_THE_GRAPH, str(bag), str(here), *settings]
     completed = subprocess.run(command, capture_output=True, text=True, check=False)
     if completed.returncode != 0:
         raise SystemExit(f"the run ended with {completed.returncode}: {completed.stderr.strip()}")

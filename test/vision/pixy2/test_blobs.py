@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robot_formation.vision.pixy2.blobs import Blob, connect
-from robot_formation.vision.pixy2.scanner import Segments
+from robot_formation.vision.pixy2.segments import Segments
 from vision_literal import connected
 
 
