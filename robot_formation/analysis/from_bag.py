@@ -17,7 +17,6 @@ from robot_formation import names
 from robot_formation.analysis.displacement_log import DisplacementLog
 from robot_formation.analysis.errors import AnalysisError
 from robot_formation.analysis.run_record import FollowerRecord, Ground, OverheadTrack, RunRecord, Stamped, Track
-from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.message_recorder import METADATA_NAME
 from robot_formation.bag.odometry import ODOMETRY_TYPE, Odometry
@@ -70,14 +69,16 @@ def run_record(bag: FormationBag) -> RunRecord:
         BagError: the bag is corrupted, or a topic has another message type than a run's.
         AnalysisError: the bag has no run of a formation.
     """
-    robots, messages, stamps = run_messages(bag)
-    return record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
+    robots, messages, stamps, truth = run_messages(bag)
+    return record_of(robots, messages, bag.metadata(METADATA_NAME), stamps, truth)
 
 
 def run_messages(
     bag: FormationBag, beside: Callable[[RawMessage], None] | None = None, topics: Collection[str] = ()
-) -> tuple[list[str], dict[str, Sequence[Message]], dict[str, list[int]]]:
-    """Read what a run's record is made of: robots, messages by topic, and simulated time [ns] of each of these.
+) -> tuple[list[str], dict[str, list[Message]], dict[str, list[int]], dict[str, GroundTruth]]:
+    """Read what a run's record is made of: robots, messages by topic, simulated time [ns] of each of these, true poses.
+
+    True poses by robot, where there are any. They are most of a bag, so their messages are not kept.
 
     Args:
         bag: the open bag.
@@ -93,34 +94,31 @@ def run_messages(
     bag.require({topic: type_name for topic, type_name in wanted.items() if topic in bag.topics})
     messages: dict[str, list[Message]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
-    cdr: dict[str, list[bytes]] = defaultdict(list)
+    odometry = {topic: Odometry(f"{bag.path}: '{topic}'") for topic in map(_truth_topic, robots)}
     for raw in bag.raw_messages({*wanted, *topics}):
         if raw.topic not in wanted:
             if beside is not None:
                 beside(raw)
             continue
-        stamps[raw.topic].append(raw.stamp_ns)
         if raw.type_name == ODOMETRY_TYPE:
-            cdr[raw.topic].append(raw.cdr)
+            odometry[raw.topic].add(raw.cdr)
         else:
+            stamps[raw.topic].append(raw.stamp_ns)
             messages[raw.topic].append(bag.bag.decoded(raw).message)
-    return robots, {**messages, **{topic: _odometry(bag, topic, found) for topic, found in cdr.items()}}, stamps
+    poses = {robot: GroundTruth(*odometry[_truth_topic(robot)].poses()) for robot in robots}
+    return robots, messages, stamps, {robot: found for robot, found in poses.items() if len(found.stamps_ns)}
 
 
-def _odometry(bag: FormationBag, topic: str, cdr: Sequence[bytes]) -> Odometry:
-    try:
-        return Odometry(cdr)
-    except Exception as error:  # rosbags' decoders have no common error
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise BagError(f"{bag.path}: '{topic}' holds a message that can't be read: {reason}") from error
+def _truth_topic(robot: str) -> str:
+    return names.ground_truth_odom(robot).of()
 
 
 def record_of(
     robots: Sequence[str],
     messages: Mapping[str, Sequence[Message]],
     details: Mapping[str, str],
-    stamps: Mapping[str, Sequence[int]] | None = None,
-    truth: Mapping[str, GroundTruth] | None = None,
+    stamps: Mapping[str, Sequence[int]],
+    truth: Mapping[str, GroundTruth],
 ) -> RunRecord:
     """Return a run's record made from its messages by absolute topic, in order; whoever read them, rosbags or ROS.
 
@@ -129,14 +127,11 @@ def record_of(
         messages: those of the topics that `run_topics` names; topics without messages may be absent.
         details: what the run says of itself.
         stamps: simulated time [ns] of each of these messages, where it is known.
-        truth: ground truth by robot, each of one pose at least; None: it is among the messages.
+        truth: ground truth by robot, each of one pose at least.
     """
     messages = defaultdict(tuple, messages)
-    stamps = defaultdict(list, stamps or {})
+    stamps = defaultdict(list, stamps)
     markers = messages[names.SURFACE.of()]
-    if truth is None:
-        odometry = {robot: messages[names.ground_truth_odom(robot).of()] for robot in robots}
-        truth = {robot: _ground_truth(found) for robot, found in odometry.items() if found}
     latest_ns = [_last_stamp_ns(messages), *(int(poses.stamps_ns[-1]) for poses in truth.values())]
     record = RunRecord(
         leader_moved=_stamped(messages[names.MOVED.of(names.LEADER)]),
@@ -284,22 +279,11 @@ def _yaw(quaternion: Message) -> float:
     return yaw_rad((quaternion.x, quaternion.y, quaternion.z, quaternion.w))
 
 
-def _ground_truth(messages: Sequence[Message]) -> GroundTruth:
-    """Take the stamps and poses out of Odometry messages, at least one."""
-    if isinstance(messages, Odometry):
-        return GroundTruth(messages.stamps_ns, messages.positions_m, messages.orientations)
-    poses = [message.pose.pose for message in messages]
-    return GroundTruth(
-        np.array([_stamp_ns(message) for message in messages], dtype=np.int64),
-        np.array([_place(pose.position) for pose in poses]),
-        np.array([(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w) for pose in poses]),
-    )
-
-
 def _track(poses: GroundTruth) -> Track:
     """Turn poses into a true path, in order of their stamps."""
     order = np.argsort(poses.stamps_ns, kind="stable")
-    yaws = np.array([yaw_rad(turn) for turn in poses.orientations.tolist()])
+    # One by one: a long run's poses as a list would take 200 bytes each.
+    yaws = np.fromiter((yaw_rad(turn.tolist()) for turn in poses.orientations), float, len(order))
     tilts = _ups(poses.orientations)[:, :2]
     return Track(poses.stamps_ns[order], poses.positions_m[order], yaws[order], tilts[order])
 

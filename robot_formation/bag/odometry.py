@@ -3,64 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.bag.definitions import jazzy_typestore
-from robot_formation.names import Message
+from robot_formation.bag.errors import BagError
 
 ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
 _HEAD = 4  # of a CDR message: what follows is aligned from here on
 _LITTLE_ENDIAN = 1
 _POSE_NUMBERS = 7  # x, y, z of the place, x, y, z, w of the orientation
+_READ_AT_ONCE = 4096
 _FARTHEST_M = 1e6
 _MOST_OFF_UNIT = 1e-3  # length of a quaternion
 
 
-class Odometry(Sequence[Message]):
-    """The messages of a topic, decoded one by one when they are asked for.
+class Odometry:
+    """Stamps and poses of a topic's messages. The messages themselves, 700 bytes each, are not kept.
 
     Messages whose pose is none are left out: see `are_poses`.
 
-    Attributes:
-        stamps_ns: (n,) nanoseconds, as the messages tell.
-        positions_m: (n, 3) x, y, z.
-        orientations: (n, 4) x, y, z, w.
-
     Args:
-        cdr: serialised messages, at least one.
+        where: the bag's path and the topic, for what is said of a message that can't be read.
     """
 
-    def __init__(self, cdr: Sequence[bytes]) -> None:
-        columns = _columns(cdr)
-        if columns is None:
-            messages = [_decoded(message) for message in cdr]
-            poses = [message.pose.pose for message in messages]
-            stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages]
-            places = [(p.position.x, p.position.y, p.position.z) for p in poses]
-            turns = [(p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w) for p in poses]
-            columns = np.array(stamps, dtype=np.int64), np.hstack([np.array(places), np.array(turns)])
-        stamps_of, poses_of = columns
-        kept = are_poses(poses_of[:, :3], poses_of[:, 3:])
-        self._cdr = [cdr[index] for index in np.flatnonzero(kept).tolist()]
-        self.stamps_ns = stamps_of[kept]
-        self.positions_m, self.orientations = poses_of[kept, :3], poses_of[kept, 3:]
+    def __init__(self, where: str) -> None:
+        self._where = where
+        self._unread: list[bytes] = []
+        self._parts = [(np.empty(0, np.int64), np.empty((0, _POSE_NUMBERS)))]
 
-    def __len__(self) -> int:
-        return len(self._cdr)
+    def add(self, cdr: bytes) -> None:
+        """Take a serialised message; it may be read later, together with others, and refused then.
 
-    @overload
-    def __getitem__(self, index: int) -> Message: ...
+        Raises:
+            BagError: a message can't be read.
+        """
+        self._unread.append(cdr)
+        if len(self._unread) >= _READ_AT_ONCE:
+            self._read()
 
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Message]: ...
+    def poses(self) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return stamps (n,) in nanoseconds, places (n, 3) x, y, z, and orientations (n, 4) x, y, z, w.
 
-    def __getitem__(self, index: int | slice) -> Message | Sequence[Message]:
-        if isinstance(index, slice):
-            return [self[each] for each in range(*index.indices(len(self)))]
-        return _decoded(self._cdr[index])
+        Raises:
+            BagError: a message can't be read.
+        """
+        if self._unread:
+            self._read()
+        stamps, poses = (np.concatenate(parts) for parts in zip(*self._parts, strict=True))
+        return stamps, poses[:, :3], poses[:, 3:]
+
+    def _read(self) -> None:
+        cdr, self._unread = self._unread, []
+        try:
+            stamps, poses = _columns(cdr) or _decoded(cdr)
+        except Exception as error:  # rosbags' decoders have no common error
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise BagError(f"{self._where} holds a message that can't be read: {reason}") from error
+        kept = are_poses(poses[:, :3], poses[:, 3:])
+        self._parts.append((stamps[kept], poses[kept]))
 
 
 def are_poses(positions_m: NDArray[np.float64], orientations: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -71,8 +73,14 @@ def are_poses(positions_m: NDArray[np.float64], orientations: NDArray[np.float64
     return np.asarray(near & unit)
 
 
-def _decoded(cdr: bytes) -> Message:
-    return jazzy_typestore().deserialize_cdr(cdr, ODOMETRY_TYPE)
+def _decoded(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Read stamps (n,) and poses (n, 7) of any messages, one by one."""
+    messages = [jazzy_typestore().deserialize_cdr(message, ODOMETRY_TYPE) for message in cdr]
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages]
+    places = [m.pose.pose.position for m in messages]
+    turns = [m.pose.pose.orientation for m in messages]
+    poses = [(p.x, p.y, p.z, o.x, o.y, o.z, o.w) for p, o in zip(places, turns, strict=True)]
+    return np.array(stamps, dtype=np.int64), np.array(poses)
 
 
 def _columns(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:

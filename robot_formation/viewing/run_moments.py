@@ -47,10 +47,11 @@ class RunMoments:
         """
         self._bag = bag
         self._beside = {topic: list[RawMessage]() for topic in self._topics_beside(robots_in(bag))}
-        robots, messages, stamps = run_messages(bag, lambda raw: self._beside[raw.topic].append(raw), self._beside)
-        self.record = record_of(robots, messages, bag.metadata(METADATA_NAME), stamps)
-        odometry = {robot: messages.get(names.ground_truth_odom(robot).of()) for robot in robots}
-        self._poses = {robot: TruePoses(found, _POSE_PERIOD_NS) for robot, found in odometry.items() if found}
+        robots, messages, stamps, truth = run_messages(
+            bag, lambda raw: self._beside[raw.topic].append(raw), self._beside
+        )
+        self.record = record_of(robots, messages, bag.metadata(METADATA_NAME), stamps, truth)
+        self._poses = {robot: TruePoses(*found, period_ns=_POSE_PERIOD_NS) for robot, found in truth.items()}
         if not self._poses:
             topic = names.ground_truth_odom(names.LEADER).of()
             raise BagError(f"{bag.path} tells no true poses, which a view is made of; record '{topic}' and the like")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,8 +9,7 @@ from numpy.typing import NDArray
 
 from robot_formation import names
 from robot_formation.bag.formation_bag import FormationBag
-from robot_formation.bag.odometry import Odometry, are_poses
-from robot_formation.names import Message
+from robot_formation.bag.odometry import Odometry
 from robot_formation.world.pose import Pose
 
 
@@ -24,26 +22,25 @@ class TruePoses:
         orientations: (n, 4) unit quaternions x, y, z, w.
     """
 
-    def __init__(self, messages: Sequence[Message], period_ns: int) -> None:
-        """Take the poses out of nav_msgs/Odometry messages; those that are none are left out.
+    def __init__(
+        self,
+        stamps_ns: NDArray[np.int64],
+        positions_m: NDArray[np.float64],
+        orientations: NDArray[np.float64],
+        *,
+        period_ns: int,
+    ) -> None:
+        """Take poses in any order, at least one.
 
         Args:
-            messages: at least one.
+            stamps_ns: see the attributes.
+            positions_m: alike.
+            orientations: alike.
             period_ns: longest time between two poses of a motion. A robot that stands tells none.
         """
         self._period_ns = period_ns
-        if isinstance(messages, Odometry):
-            order = np.argsort(messages.stamps_ns, kind="stable")
-            self.stamps_ns = messages.stamps_ns[order]
-            self.positions_m, self.orientations = messages.positions_m[order], messages.orientations[order]
-            return
-        poses = [message.pose.pose for message in messages]
-        stamps = np.array([m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
-        positions = np.array([(p.position.x, p.position.y, p.position.z) for p in poses])
-        turns = np.array([(p.orientation.x, p.orientation.y, p.orientation.z, p.orientation.w) for p in poses])
-        order = np.argsort(stamps, kind="stable")
-        order = order[are_poses(positions, turns)[order]]
-        self.stamps_ns, self.positions_m, self.orientations = stamps[order], positions[order], turns[order]
+        order = np.argsort(stamps_ns, kind="stable")
+        self.stamps_ns, self.positions_m, self.orientations = stamps_ns[order], positions_m[order], orientations[order]
 
     def at(self, stamp_ns: int) -> Pose:
         """Return the pose at a stamp: between two poses of a motion on the line between them, else the last one.
@@ -89,8 +86,8 @@ def true_poses(bag: FormationBag, robots: Sequence[str], period_ns: int) -> dict
     topics = {names.ground_truth_odom(robot).of(): robot for robot in robots}
     there = [topic for topic in topics if topic in bag.topics]
     bag.require({topic: names.ground_truth_odom(topics[topic]).type for topic in there})
-    messages: dict[str, list[Message]] = defaultdict(list)
-    for message in bag.messages(there):
-        messages[topics[message.topic]].append(message.message)
-    poses = {robot: TruePoses(found, period_ns) for robot, found in messages.items()}
-    return {robot: found for robot, found in poses.items() if len(found.stamps_ns)}
+    odometry = {topics[topic]: Odometry(f"{bag.path}: '{topic}'") for topic in there}
+    for raw in bag.raw_messages(there):
+        odometry[topics[raw.topic]].add(raw.cdr)
+    poses = {robot: found.poses() for robot, found in odometry.items()}
+    return {robot: TruePoses(*found, period_ns=period_ns) for robot, found in poses.items() if len(found[0])}

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from repository import ROOT
 from robot_formation import conversions, names
+from robot_formation.bag import odometry
+from robot_formation.bag.errors import BagError
 from robot_formation.bag.formation_bag import FormationBag
 from robot_formation.bag.odometry import Odometry, _columns
 from robot_formation.bag.reader import read_bag
@@ -25,6 +28,13 @@ def one(child: str, x_m: float, stamp_ns: int, turn: Quaternion = (0.0, 0.6, 0.0
     return conversions.to_cdr(message)
 
 
+def poses_of(cdr: list[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    found = Odometry("bag: 'topic'")
+    for message in cdr:
+        found.add(message)
+    return found.poses()
+
+
 @pytest.mark.parametrize(
     "cdr",
     [
@@ -35,16 +45,22 @@ def one(child: str, x_m: float, stamp_ns: int, turn: Quaternion = (0.0, 0.6, 0.0
     ids=["recorded", "made", "frames that differ"],
 )
 def test_columns_are_what_the_messages_hold(cdr: list[bytes]) -> None:
-    found = Odometry(cdr)
-    assert len(found) == len(cdr)
+    stamps_ns, positions_m, orientations = poses_of(cdr)
+    assert len(stamps_ns) == len(cdr)
     for index in {0, len(cdr) // 2, len(cdr) - 1}:
         message = conversions.from_cdr(cdr[index], "nav_msgs/msg/Odometry")
         p, o = message.pose.pose.position, message.pose.pose.orientation
-        assert found.positions_m[index].tolist() == [p.x, p.y, p.z]
-        assert found.orientations[index].tolist() == [o.x, o.y, o.z, o.w]
-        assert found.stamps_ns[index] == conversions.stamp_of(message)
-        assert found[index].header.frame_id == message.header.frame_id
-    assert [m.pose.pose.position.x for m in found[:2]] == found.positions_m[:2, 0].tolist()
+        assert positions_m[index].tolist() == [p.x, p.y, p.z]
+        assert orientations[index].tolist() == [o.x, o.y, o.z, o.w]
+        assert stamps_ns[index] == conversions.stamp_of(message)
+
+
+def test_poses_read_in_parts_are_those_read_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    cdr = [*recorded(), one("longer", 1.5, 6)]
+    whole = poses_of(cdr)
+    monkeypatch.setattr(odometry, "_READ_AT_ONCE", 7)
+    for at_once, in_parts in zip(whole, poses_of(cdr), strict=True):
+        assert np.array_equal(at_once, in_parts)
 
 
 def test_messages_with_the_same_frames_are_read_at_once_and_others_one_by_one() -> None:
@@ -56,8 +72,8 @@ def test_messages_with_the_same_frames_are_read_at_once_and_others_one_by_one() 
 
 def test_a_message_that_is_cut_off_is_an_error() -> None:
     whole = one("a", 1.0, 5)
-    with pytest.raises(Exception, match=r".+"):
-        Odometry([whole[:60]])
+    with pytest.raises(BagError, match=r"^bag: 'topic' holds a message that can't be read: "):
+        poses_of([whole[:60]])
 
 
 @pytest.mark.parametrize("child", ["a", "longer"])
@@ -66,16 +82,16 @@ def test_what_is_no_pose_is_left_out(child: str) -> None:
     nan = float("nan")
     bad = [one("a", nan, 6), one("a", float("inf"), 6), one("a", 1e300, 6), one("a", 1.0, 6, (0.0, 0.0, 0.0, 0.0))]
     bad += [one("a", 1.0, 6, (0.0, 0.0, 0.0, nan)), one("a", 1.0, 6, (0.0, 0.0, 0.0, 2.0))]
-    found = Odometry([good[0], *bad, good[1]])
-    assert found.stamps_ns.tolist() == [5, 9]
-    assert found.positions_m[:, 0].tolist() == [1.0, 1.5]
-    assert [message.pose.pose.position.x for message in found] == [1.0, 1.5]
-    assert found.orientations.shape == (2, 4)
-    assert len(Odometry(bad)) == 0
+    stamps_ns, positions_m, orientations = poses_of([good[0], *bad, good[1]])
+    assert stamps_ns.tolist() == [5, 9]
+    assert positions_m[:, 0].tolist() == [1.0, 1.5]
+    assert orientations.shape == (2, 4)
+    assert len(poses_of(bad)[0]) == 0
 
 
 def test_stamps_and_poses_are_numbers_of_their_types() -> None:
-    found = Odometry(recorded())
-    assert found.stamps_ns.dtype == np.int64
-    assert found.positions_m.shape == (len(found), 3)
-    assert found.orientations.shape == (len(found), 4)
+    for cdr in (recorded(), []):
+        stamps_ns, positions_m, orientations = poses_of(cdr)
+        assert stamps_ns.dtype == np.int64
+        assert positions_m.shape == (len(cdr), 3)
+        assert orientations.shape == (len(cdr), 4)
