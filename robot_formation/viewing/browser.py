@@ -6,7 +6,6 @@ import contextlib
 import io
 import os
 import socket
-import webbrowser
 from collections.abc import Iterator
 from typing import Any
 
@@ -88,6 +87,8 @@ def open_browser(url: str) -> str:
             f"view: {url} (no display here: open it in a browser of this machine, or from another one after "
             f"ssh -L {port}:{HOST}:{port})"
         )
+    import webbrowser  # not above: the launcher of a run without a view needs none
+
     opened = webbrowser.open(url)
     return f"view: {url}" + ("" if opened else " (no browser was found: open it in one)")
 

@@ -11,7 +11,7 @@ import pytest
 
 from graph_tools import short_scenario
 from robot_formation import conversions, names
-from robot_formation.analysis.from_bag import load_run
+from robot_formation.analysis.from_bag import GroundTruth, load_run
 from robot_formation.analysis.from_bag import record_of as record_of_messages
 from robot_formation.analysis.quantities import analyse
 from robot_formation.analysis.report import text_report, write_pictures
@@ -205,12 +205,12 @@ def test_a_robot_that_the_camera_never_saw_has_no_error_and_one_seen_late_none_b
         "/overhead/poses": [
             stamped(second, poses=[pose(places[second]) for places in told.values()]) for second in range(4)
         ],
-        **{
-            f"/ground_truth/{robot}/odom": [stamped(0, pose=SimpleNamespace(pose=pose(places[0])))]
-            for robot, places in told.items()
-        },
     }
-    overhead = record_of_messages(list(told), messages, {}).overhead
+    turn = np.array([[0.0, 0.0, 0.0, 1.0]])
+    truth = {
+        robot: GroundTruth(np.array([0]), np.array([[places[0], 0.0, 0.0]]), turn) for robot, places in told.items()
+    }
+    overhead = record_of_messages(list(told), messages, {}, {}, truth).overhead
     assert {robot: list(track.seen_m[:, 0]) for robot, track in overhead.items()} == {
         "leader": [0.1, 0.11, 0.12],
         "follower_2": [0.71, 0.72],

@@ -17,7 +17,7 @@ from repository import ROOT
 from robot_formation import conversions, names
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.names import JOINTS, Topic
-from robot_formation.nodes.host.component_node import qos_profile
+from robot_formation.nodes.host.qos import qos_profile
 
 pytestmark = [pytest.mark.graph, pytest.mark.xdist_group("real_robots")]
 

@@ -23,7 +23,7 @@ from robot_formation.launching.environment import node_environment
 from robot_formation.names import Topic, absolute
 from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.network.shared_memory import clean_after_graph
-from robot_formation.nodes.host.component_node import qos_profile
+from robot_formation.nodes.host.qos import qos_profile
 
 DEADLINE_S = 90.0  # long enough for a machine that others keep busy
 

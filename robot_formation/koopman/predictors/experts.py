@@ -50,7 +50,7 @@ class BankExpert:
         self._groups: list[tuple[list[int], NDArray[np.int64]]] = (
             [([0, 1], np.arange(len(first)))]
             if self._together
-            else [([int(axis)], np.flatnonzero(first == axis)) for axis in np.unique(first)]
+            else [([axis], np.flatnonzero(first == axis)) for axis in sorted(set(first.tolist()))]
         )
 
         self._weigh()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from dataclasses import dataclass
@@ -14,8 +15,6 @@ from robot_formation.leader.paths.base import Heading, PathKind
 from robot_formation.leader.paths.straight import STEP
 from robot_formation.leader.paths.waves import PHASE
 from robot_formation.parameters import Choice, parameter
-
-_NODES, _WEIGHTS = (tuple(map(float, values)) for values in np.polynomial.legendre.leggauss(8))
 
 
 class Sides(Choice):
@@ -48,7 +47,7 @@ class Clothoid(PathKind):
         origin = start if self.heading is Heading.ALONG else self._turned(0.0)
         for begin, end in itertools.pairwise(self._pieces(timestep)):
             middle, half = 0.5 * (begin + end), 0.5 * (end - begin)
-            for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+            for node, weight in _quadrature():
                 angle = self._turned(middle + half * node) - origin
                 x_m += weight * half * self.step_m * math.cos(angle)
                 y_m += weight * half * self.step_m * math.sin(angle)
@@ -71,3 +70,10 @@ class Clothoid(PathKind):
         if self.direction is Sides.BOTH:
             return one * (part if int(periods) % 2 == 0 else 1.0 - part)
         return one * (periods + part) * (1.0 if self.direction is Sides.LEFT else -1.0)
+
+
+@functools.cache
+def _quadrature() -> list[tuple[float, float]]:
+    """Return nodes and weights of Gauss-Legendre quadrature on -1 to 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    return list(zip(nodes.tolist(), weights.tolist(), strict=True))

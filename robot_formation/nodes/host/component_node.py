@@ -21,8 +21,6 @@ from rclpy.exceptions import (
     InvalidParameterValueException,
 )
 from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node, NodeNameNonExistentError
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
@@ -37,7 +35,9 @@ from robot_formation.network.loopback import use_loopback
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.help import help_text
 from robot_formation.nodes.host.live_transforms import LiveTransforms, transform_topics
+from robot_formation.nodes.host.living_nodes import node_names
 from robot_formation.nodes.host.outbox import Outbox
+from robot_formation.nodes.host.qos import qos_profile
 from robot_formation.nodes.host.repetition import Repetitions
 from robot_formation.nodes.host.ros_parameters import (
     AT_START,
@@ -55,31 +55,6 @@ _HELD_BACK_S = 0.01  # how often it looks for listeners while messages are held 
 _DIAGNOSTICS_S = 1.0
 _ACKNOWLEDGED_S = 2.0
 _BAD_INPUT = (FormationError, InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException)
-
-
-def qos_profile(qos: names.Qos) -> QoSProfile:
-    """Make rclpy's profile."""
-    return QoSProfile(
-        reliability=ReliabilityPolicy[qos.reliability.upper()],
-        durability=DurabilityPolicy[qos.durability.upper()],
-        history=HistoryPolicy[qos.history.upper()],
-        depth=qos.depth,
-    )
-
-
-def node_names(node: Node) -> set[str]:
-    """Return the full names of the nodes in a node's graph that have a publisher or a subscription.
-
-    One without has gone: the middleware may list it for good if its last words came after its farewell.
-    """
-    found = set()
-    for name, namespace in node.get_node_names_and_namespaces():
-        with contextlib.suppress(NodeNameNonExistentError):
-            if node.get_publisher_names_and_types_by_node(
-                name, namespace
-            ) or node.get_subscriber_names_and_types_by_node(name, namespace):
-                found.add(names.absolute(namespace, name))
-    return found
 
 
 def main_of(kind: str) -> int:

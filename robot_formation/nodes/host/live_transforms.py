@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robot_formation import conversions, names
-from robot_formation.bag.transforms import Transforms
 from robot_formation.names import Message
 
 
@@ -28,6 +27,8 @@ class LiveTransforms:
     """
 
     def __init__(self, namespace: str) -> None:
+        from robot_formation.bag.transforms import Transforms  # it loads rosbags: only where it is needed
+
         self._namespace = namespace
         self._maker = Transforms()
         self._topics = {names.absolute(namespace, topic.name): topic for topic in (names.TF, names.TF_STATIC)}
@@ -40,7 +41,7 @@ class LiveTransforms:
             message: what is published on it.
         """
         name = names.absolute(self._namespace, topic.name)
-        if Transforms.wants(name, topic.type):
+        if self._maker.wants(name, topic.type):
             # The stamps in the messages count; that of the log is the recorder's business.
             self._maker.take(name, topic.type, conversions.to_cdr(message), 0)
             for made in self._maker.make():

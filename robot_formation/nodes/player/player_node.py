@@ -24,8 +24,8 @@ from robot_formation.bag.reader import Bag, read_bag
 from robot_formation.bag.selection import Selection
 from robot_formation.bag.source import RawMessage
 from robot_formation.names import Message
-from robot_formation.nodes.host.component_node import qos_profile
 from robot_formation.nodes.host.executor import make_executor
+from robot_formation.nodes.host.qos import qos_profile
 from robot_formation.nodes.host.ros_parameters import ParameterNode, declare, take_changes
 from robot_formation.nodes.host.signals import stopped
 from robot_formation.nodes.player.keyboard import Keyboard

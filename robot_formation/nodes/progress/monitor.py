@@ -18,8 +18,9 @@ from rclpy.signals import SignalHandlerOptions
 from robot_formation import conversions, names
 from robot_formation.names import Message
 from robot_formation.network.loopback import BEYOND, PROFILES, RANGE
-from robot_formation.nodes.host.component_node import node_names, qos_profile
 from robot_formation.nodes.host.executor import make_executor
+from robot_formation.nodes.host.living_nodes import node_names
+from robot_formation.nodes.host.qos import qos_profile
 
 # Nodes whose names begin with an underscore are hidden: nobody waits for them, and lists leave them out.
 _NAME = "_monitor"

@@ -16,8 +16,9 @@ from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.stand_ins import LONGEST_S, TIMEOUT_S, StandIns, how_to_start
 from robot_formation.names import Message
 from robot_formation.nodes.followed_run import FollowedRunParameters
-from robot_formation.nodes.host.component_node import node_names, qos_profile
 from robot_formation.nodes.host.executor import make_executor
+from robot_formation.nodes.host.living_nodes import node_names
+from robot_formation.nodes.host.qos import qos_profile
 from robot_formation.nodes.host.ros_parameters import ParameterNode, declare
 from robot_formation.nodes.host.signals import stopped
 from robot_formation.nodes.progress.monitor import topic_of

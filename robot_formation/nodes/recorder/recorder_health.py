@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from rclpy.node import Node
 
 from robot_formation import conversions, names
-from robot_formation.nodes.host.component_node import qos_profile
+from robot_formation.nodes.host.qos import qos_profile
 
 OK, WARNING = 0, 1
 _WORD_BYTES = 4  # a middleware delivers whole words

@@ -17,8 +17,8 @@ from robot_formation.errors import MessageError
 from robot_formation.experiment.progress import Progress
 from robot_formation.names import Message, Topic
 from robot_formation.nodes.followed_run import FollowedRunParameters
-from robot_formation.nodes.host.component_node import qos_profile
 from robot_formation.nodes.host.executor import make_executor
+from robot_formation.nodes.host.qos import qos_profile
 from robot_formation.nodes.host.ros_parameters import ParameterNode, declare
 from robot_formation.nodes.host.signals import stopped
 from robot_formation.nodes.progress.monitor import topic_of
