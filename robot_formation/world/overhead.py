@@ -70,7 +70,8 @@ class OverheadCamera:
         self._picture = self._sampled(self._canvas)
         self._drawn: dict[Pose, _Outlines] = {}
         drawn = generator(seed, "overhead", "camera").standard_normal(2 * self._size, dtype=np.float32)
-        self._pool = np.rint(np.clip(drawn * p.noise, -127, 127)).astype(np.int8)
+        drawn *= np.float32(p.noise)
+        self._pool = np.rint(np.clip(drawn, -127, 127, out=drawn), out=drawn).astype(np.int8)
 
     def project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Exact image (n, 2) in pixels (column, row), distortion included, of world points (n, 3) below the lens."""

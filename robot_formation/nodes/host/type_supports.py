@@ -1,8 +1,6 @@
 """Loads what rclpy otherwise loads when a node is made: a process that forks nodes does so once for all of them.
 
-rclpy loads a message package's library when a first message of it is published or subscribed to, and with the first of
-all the modules that generate messages' Python code, which nobody needs but which are imported together: of processor
-time and memory up to 0.08 s and 3.6 MB in each node.
+rclpy loads a message package's library when a first message of it is published or subscribed to.
 """
 
 from __future__ import annotations

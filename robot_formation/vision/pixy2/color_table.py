@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,20 +70,18 @@ class ColorTable:
     @classmethod
     def built(cls, signatures: Iterable[Signature], parameters: DetectorParameters) -> ColorTable:
         """Build the table."""
-        u, v, total, bins = _colors()
         min_sum = max(1, int(np.float32(765) * np.float32(parameters.min_brightness)))
-        labels = np.zeros(STRIDE * STRIDE, np.uint8)
+        bounds = {}
         low, high = np.zeros((2, 2, SIGNATURES + 1))
-        # Lower numbers win, hence are written last.
-        for signature in sorted(signatures, key=lambda s: -s.sig):
+        for signature in signatures:
             if signature.u_min == signature.u_max == 0:
                 continue
             code = is_code(signature, parameters.color_code_mode)
-            u_min, u_max, v_min, v_max = run_time_bounds(signature, parameters.range_of(signature.sig), code=code)
-            inside = (u > u_min) & (u < u_max) & (v > v_min) & (v < v_max) & (total >= min_sum)
-            labels[bins[inside]] = signature.sig
+            gain = parameters.range_of(signature.sig)
+            u_min, u_max, v_min, v_max = bounds[signature.sig] = run_time_bounds(signature, gain, code=code)
             low[:, signature.sig] = [_above(bound) for bound in (u_min, v_min)]
             high[:, signature.sig] = [-_above(-bound) for bound in (u_max, v_max)]
+        labels = _labels(bounds, min_sum)
         for array in (labels, low, high):
             array.setflags(write=False)
         return cls(labels, low, high, min_sum)
@@ -103,15 +101,20 @@ def _above(bound: int) -> float:
     return (bound + 1 - 1 / 4096 if bound >= 0 else bound) / (1 << SCALE_BITS)
 
 
-_Int32 = npt.NDArray[np.int32]
-
-
-def _colors() -> tuple[_Int32, _Int32, _Int32, _Int32]:
-    """Chroma u and v, sum and table index of every fourth level of r, g and b, each of shape (262144,)."""
-    r, g, b = (axis.ravel() for axis in np.meshgrid(*[np.arange(0, 256, 4, dtype=np.int32)] * 3, indexing="ij"))
-    total = r + g + b
-    divisor = np.maximum(total, 1)
-    u = ((r - g << SCALE_BITS) / divisor).astype(np.int32)
-    v = ((b - g << SCALE_BITS) / divisor).astype(np.int32)
-    bins = (r - g >> 3) * STRIDE + (b - g >> 3)
-    return u, v, total, bins
+def _labels(bounds: Mapping[int, tuple[int, int, int, int]], min_sum: int) -> npt.NDArray[np.uint8]:
+    """Label the bins by what the camera finds at every fourth level of r, g and b; of several signatures the lowest."""
+    none = SIGNATURES + 1
+    labels = np.full(STRIDE * STRIDE, none, np.uint8)
+    g, b = np.meshgrid(*[np.arange(0, 256, 4, dtype=np.int32)] * 2, indexing="ij")
+    for r in range(0, 256, 4):  # all at once would take 12 MB
+        total = r + g + b
+        divisor = np.maximum(total, 1)
+        u = ((r - g << SCALE_BITS) / divisor).astype(np.int32)
+        v = ((b - g << SCALE_BITS) / divisor).astype(np.int32)
+        bins = (r - g >> 3) * STRIDE + (b - g >> 3)
+        for number, (u_min, u_max, v_min, v_max) in bounds.items():
+            inside = (u > u_min) & (u < u_max) & (v > v_min) & (v < v_max) & (total >= min_sum)
+            found = bins[inside]
+            labels[found] = np.minimum(labels[found], number)
+    labels[labels == none] = 0
+    return labels
