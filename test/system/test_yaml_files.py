@@ -41,7 +41,8 @@ class RefusedError(FormationError):
         ("a: 1\nworld: &w {a: *w}", "inside what it refers to", 2),
         ("*missing", "before it", 1),
         (BOMB, "more than 100000 values", 5),
-        ("[" * 5000, "nested more than", 1),
+        ("[" * 100, "nested more than", 1),
+        ("[" * 5000, "nest", 1),  # libyaml has a bound of its own from PyYAML 6.0.4 on, in its own words
         ("? [a]\n: b", "unhashable", 1),
         ("a: b: c", "not allowed", 1),
         (b"a: \xff", "no text in UTF-8", None),
