@@ -29,6 +29,11 @@ _FEW_TURNS = {"precise.filter.step.change_sigma_rad": 0.003}
 forecast again, and for the first 10 degrees or more the Target face alone shows, which does not contradict it. With the
 default a follower on a slalom turned away by 24 degrees in nine timesteps."""
 
+_CHAIN_TOLERANCES = {"precise.u_tolerance_m": 0.005, "precise.v_tolerance_m": 0.004}
+"""In a chain a correction of several millimetres aside looks like a turn to the follower behind: 1 mm on a step of 5 cm
+is 1.1 degrees, and a heading that is 1 degree off puts that follower 6 mm beside its place. So corrections begin
+sooner, and are smaller, than those of a single follower, which begin at 9 and 6 mm."""
+
 
 def backdrop(followers: int, spacing: Spacing, own: Mapping[str, object]) -> dict[str, object]:
     """Return the world's parameters of a chain's markers, apart from those that are set."""
@@ -40,6 +45,12 @@ def edges_before_board(marker: MarkerParameters, own: Mapping[str, object]) -> d
     """Return the fine-tuner's parameters of how the edges of a marker before its board are reported."""
     light = marker.backdrop_m > 0.0 and min(marker.backdrop_rgb) >= _LEAST_LIGHT
     return {name: value for name, value in _BEFORE_LIGHT_BOARD.items() if light and name not in own}
+
+
+def chain_tolerances(followers: int, schedule: Schedule, own: Mapping[str, object]) -> dict[str, float]:
+    """Return the fine-tuner's tolerances where several followers correct one after the other."""
+    found = _CHAIN_TOLERANCES if followers > 1 and not schedule.at_once else {}
+    return {name: value for name, value in found.items() if name not in own}
 
 
 def at_once_alignment(schedule: Schedule, own: Mapping[str, object]) -> dict[str, float]:

@@ -18,7 +18,12 @@ from robot_formation.components.node_parameters import (
 )
 from robot_formation.drive.movement_system import DriveParameters
 from robot_formation.errors import shown
-from robot_formation.experiment.chain_defaults import at_once_alignment, backdrop, edges_before_board
+from robot_formation.experiment.chain_defaults import (
+    at_once_alignment,
+    backdrop,
+    chain_tolerances,
+    edges_before_board,
+)
 from robot_formation.experiment.disturbances import pushes_of
 from robot_formation.experiment.formations import slots_of, starts_of
 from robot_formation.experiment.node_defaults import ScenarioError, node_defaults, read_scenario_yaml
@@ -257,6 +262,7 @@ def build(setup: Setup, settings: Settings, given: Collection[str] = START) -> S
             formation_ahead_m=slots[0].v_m,
             **timed,
             **edges_before_board(world.marker, settings.get("fine_tuner", {})),
+            **chain_tolerances(setup.followers, setup.schedule, settings.get("fine_tuner", {})),
             **at_once_alignment(setup.schedule, settings.get("fine_tuner", {})),
             **first["fine_tuner"],
             **bounds,

@@ -170,6 +170,24 @@ def test_a_third_robots_marker_is_hidden() -> None:
     assert max(follower.totals["formation_error_rmse_m"] for follower in found.followers) < 0.02
 
 
+def test_followers_of_a_chain_that_correct_in_turn_keep_narrower_tolerances() -> None:
+    """A follower's step aside looks like a turn to the one behind it."""
+
+    def tolerances_m(*settings: str) -> tuple[float, float]:
+        precise = scenario(*settings).fine_tuner.precise
+        return precise.u_tolerance_m, precise.v_tolerance_m
+
+    alone = tolerances_m("followers=1")
+    for schedule in ("turns", "wave"):
+        found = tolerances_m("followers=2", f"schedule={schedule}")
+        assert all(one < other for one, other in zip(found, alone, strict=True))
+        assert tolerances_m("followers=1", f"schedule={schedule}") == alone
+    for schedule in ("together", "timer"):  # a correction there moves everybody behind it once more, or there is none
+        assert tolerances_m("followers=2", f"schedule={schedule}") == alone
+    own = tolerances_m("followers=2", "fine_tuner.precise.u_tolerance_m=0.02")
+    assert own == (0.02, tolerances_m("followers=2")[1])
+
+
 def test_edges_before_a_light_board_are_known() -> None:
     """Without that a follower of a chain stands 6 mm too near."""
 
