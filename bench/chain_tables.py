@@ -293,7 +293,9 @@ def _draw_errors(axes: Any, cases: dict[Case, list[Run]]) -> None:
         longest = next(case for case in cases if (case.schedule, case.followers) == (schedule, max(counts)))
         errors = 100.0 * np.array(medians(cases[longest], "formation_error_rmse_m"))
         numbers = np.arange(1, len(errors) + 1)
-        axes.plot(numbers, errors, color=colour, marker=marker, markersize=4, label=schedule)
+        # Turns and wave end timesteps in the same places: the wider line shows below the other one.
+        wide = {"linewidth": 5, "markersize": 8} if schedule == "turns" else {"markersize": 4}
+        axes.plot(numbers, errors, color=colour, marker=marker, label=schedule, **wide)
         most = max(most, float(errors.max()))
         if schedule == "timer":
             growth = errors[0] * np.array(persistence_growth(len(errors)))
