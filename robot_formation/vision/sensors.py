@@ -71,7 +71,7 @@ class OutsideSensor:
 
 def is_outside_sensor(name: object) -> bool:
     """Whether a name may be that of a sensor from outside the package; its class is not imported for it."""
-    return isinstance(name, str) and plugins.may_be(name, KIND)
+    return isinstance(name, str) and name not in SENSORS and plugins.may_be(name, KIND)
 
 
 def find_sensor(name: str) -> None:
