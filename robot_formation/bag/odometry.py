@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from robot_formation.bag.errors import BagError
 
 ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
 _HEAD = 4  # of a CDR message: what follows is aligned from here on
+_TIME = 8  # sec and nanosec, which come first
 _LITTLE_ENDIAN = 1
 _POSE_NUMBERS = 7  # x, y, z of the place, x, y, z, w of the orientation
 _READ_AT_ONCE = 4096
@@ -83,24 +85,43 @@ def _decoded(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float6
     return np.array(stamps, dtype=np.int64), np.array(poses)
 
 
-def _columns(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
-    """Read stamps (n,) and poses (n, 7) of messages that have the same frames; None if they differ in anything else."""
-    if len({len(message) for message in cdr}) != 1 or cdr[0][:2] != bytes([0, _LITTLE_ENDIAN]):
+class Layout(NamedTuple):
+    """Where a serialised message has its time, its two frames (with their lengths) and its pose."""
+
+    time: slice
+    frames: tuple[slice, slice]
+    pose: slice
+
+
+def layout(cdr: bytes) -> Layout | None:
+    """Find the parts of a message; None if it is too short or has another byte order."""
+    if cdr[:2] != bytes([0, _LITTLE_ENDIAN]):
         return None
-    table = np.frombuffer(b"".join(cdr), np.uint8).reshape(len(cdr), -1)
-    begin = end = _HEAD + 8  # sec and nanosec come first, then both frames
+    frames, end = [], _HEAD + _TIME
     for _ in range(2):
         start = _aligned(end, 4)  # bytes that align hold anything
-        end = start + 4 + int.from_bytes(cdr[0][start : start + 4], "little")
-        if end > table.shape[1] or (table[:, start:end] != table[0, start:end]).any():
-            return None
+        end = start + 4 + int.from_bytes(cdr[start : start + 4], "little")
+        frames.append(slice(start, end))
     first = _aligned(end, 8)
     last = first + 8 * _POSE_NUMBERS
-    if last > table.shape[1] or (table[:, 1] != _LITTLE_ENDIAN).any():
+    if last > len(cdr):
         return None
-    stamps = table[:, _HEAD:begin].copy().view("<u4").astype(np.int64)
+    return Layout(slice(_HEAD, _HEAD + _TIME), (frames[0], frames[1]), slice(first, last))
+
+
+def _columns(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
+    """Read stamps (n,) and poses (n, 7) of messages that have the same frames; None if they differ in anything else."""
+    places = layout(cdr[0])
+    if places is None or len({len(message) for message in cdr}) != 1:
+        return None
+    table = np.frombuffer(b"".join(cdr), np.uint8).reshape(len(cdr), -1)
+    if any((table[:, frame] != table[0, frame]).any() for frame in places.frames):
+        return None
+    if (table[:, 1] != _LITTLE_ENDIAN).any():
+        return None
+    stamps = table[:, places.time].copy().view("<u4").astype(np.int64)
     seconds = stamps[:, 0].astype(np.int32).astype(np.int64)  # signed, as the message has it
-    return seconds * 10**9 + stamps[:, 1], table[:, first:last].copy().view("<f8").astype(float)
+    return seconds * 10**9 + stamps[:, 1], table[:, places.pose].copy().view("<f8").astype(float)
 
 
 def _aligned(place: int, size: int) -> int:

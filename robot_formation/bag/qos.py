@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 from robot_formation.bag.errors import BagError
 from robot_formation.errors import shown
@@ -75,7 +76,8 @@ class TopicQos:
         }
 
 
-def dump_profiles(profiles: Sequence[TopicQos]) -> str:
+@cache
+def dump_profiles(profiles: tuple[TopicQos, ...]) -> str:
     """Return the YAML text that rosbag2 keeps in an MCAP channel's `offered_qos_profiles`."""
     return yaml_text([profile.to_mapping() for profile in profiles]).strip()
 

@@ -12,18 +12,23 @@ import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 from robot_formation import names
 from robot_formation.bag.definitions import jazzy_typestore
+from robot_formation.bag.odometry import ODOMETRY_TYPE, Layout, layout
 from robot_formation.geometry.orientation import Quaternion, Vector, quaternion
 from robot_formation.names import Message
 
 _POSES = re.compile(r"(.*)/ground_truth/([^/]+)/odom")
 _DESCRIPTIONS = re.compile(r"(.*)/([^/]+)/robot_description")
-_ODOMETRY, _STRING = "nav_msgs/msg/Odometry", "std_msgs/msg/String"
+_STRING = "std_msgs/msg/String"
+_BODY = 4  # where a serialised message begins, behind its byte order
+_TIME = 8  # where a transform's time lies in its message
 
 _MOST_CHARACTERS = 10_000_000
+_TOPICS = 1024  # more than any recording has: of so many is kept what their names mean
 
 
 class TransformMessage(NamedTuple):
@@ -34,10 +39,34 @@ class TransformMessage(NamedTuple):
     stamp_ns: int
 
 
+class _Template(NamedTuple):
+    """A true pose and the transform that was made of it: those of the robot's other poses differ in time and pose."""
+
+    odometry: bytes
+    places: Layout
+    transform: bytes
+
+    def of(self, odometry: bytes) -> bytes | None:
+        """Return the transform of another true pose; None if that differs in more."""
+        own, (first, second) = self.odometry, self.places.frames
+        alike = (
+            len(odometry) == len(own)
+            and odometry[:_BODY] == own[:_BODY]
+            and odometry[first] == own[first]
+            and odometry[second] == own[second]
+        )
+        if not alike:
+            return None
+        # The number of transforms, 1; then header, child frame, and the pose's seven numbers in their order.
+        pose, made = odometry[self.places.pose], self.transform
+        return made[:_TIME] + odometry[self.places.time] + made[_TIME + 8 : -len(pose)] + pose
+
+
 class Transforms:
     """Collects messages as they come, cheaply, and makes transforms of them when asked."""
 
     def __init__(self) -> None:
+        self._templates: dict[tuple[str, str], _Template] = {}  # by namespace and robot
         self._taken: list[tuple[str, str, str, bytes, int]] = []
         self._static: defaultdict[str, dict[str, object]] = defaultdict(dict)  # by namespace and child frame
 
@@ -62,6 +91,10 @@ class Transforms:
         taken, self._taken = self._taken, []
         new: defaultdict[str, list[int]] = defaultdict(list)
         for namespace, robot, type_name, cdr, stamp_ns in taken:
+            template = self._templates.get((namespace, robot)) if type_name == ODOMETRY_TYPE else None
+            if template is not None and (made := template.of(cdr)) is not None:
+                yield TransformMessage(_inside(namespace, names.TF), made, stamp_ns)
+                continue
             try:
                 message = jazzy_typestore().deserialize_cdr(cdr, type_name)
             except Exception:  # the decoder has no error of its own; what can't be read says of no frame where it is
@@ -70,7 +103,10 @@ class Transforms:
                 fixed = list(_of_description(robot, message.data))
             else:
                 transform = _of_odometry(message)
-                yield _message(_inside(namespace, names.TF), [transform], stamp_ns)
+                made_message = _message(_inside(namespace, names.TF), [transform], stamp_ns)
+                if (places := layout(cdr)) is not None:
+                    self._templates[namespace, robot] = _Template(cdr, places, made_message.cdr)
+                yield made_message
                 fixed = [_transform(message.header, f"{robot}/{names.ODOM_FRAME}", transform.transform)]
             for transform in fixed:
                 if transform.child_frame_id not in self._static[namespace]:
@@ -86,12 +122,14 @@ def made_in(namespace: str) -> dict[str, str]:
     return {made.name: made.type for made in (_inside(namespace.rstrip("/"), t) for t in (names.TF, names.TF_STATIC))}
 
 
+@lru_cache(maxsize=_TOPICS)
 def _matched(topic: str, type_name: str) -> re.Match[str] | None:
     """Match a topic that is used: groups are the formation's namespace and the robot."""
-    pattern = {_ODOMETRY: _POSES, _STRING: _DESCRIPTIONS}.get(type_name)
+    pattern = {ODOMETRY_TYPE: _POSES, _STRING: _DESCRIPTIONS}.get(type_name)
     return None if pattern is None else pattern.fullmatch(topic)
 
 
+@lru_cache(maxsize=_TOPICS)
 def _inside(namespace: str, topic: names.Topic) -> names.Topic:
     return replace(topic, name=names.absolute(namespace, topic.name))
 

@@ -111,6 +111,42 @@ def test_the_robots_start_is_its_odom_frame() -> None:
     assert list(made.make()) == []
 
 
+def odometry_cdr(stamp_ns: int, x_m: float, child: str, order: str = "little") -> bytes:
+    message = odometry(stamp_ns, x_m, 0.2, 0.3)
+    message.child_frame_id = child
+    return bytes(STORE.serialize_cdr(message, ODOMETRY, little_endian=order == "little"))
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (odometry_cdr(3, 0.1, "leader/base_link"), odometry_cdr(7 * 10**9 + 5, -0.4, "leader/base_link")),
+        (odometry_cdr(3, 0.1, "leader/base_link"), odometry_cdr(4, 0.2, "another/base_link")),
+        (odometry_cdr(3, 0.1, "leader/base_link"), odometry_cdr(4, 0.2, "leader/base_lind")),
+        (odometry_cdr(3, 0.1, "leader/base_link"), odometry_cdr(4, 0.2, "leader/base_link", "big")),
+        (odometry_cdr(3, 0.1, "leader/base_link", "big"), odometry_cdr(4, 0.2, "leader/base_link", "big")),
+        (odometry_cdr(3, math.nan, "leader"), odometry_cdr(4, math.inf, "leader")),
+    ],
+    ids=["the same frames", "a longer frame", "a frame of the same length", "another order", "big", "no numbers"],
+)
+def test_a_transform_made_like_the_one_before_is_as_if_it_were_the_first(first: bytes, second: bytes) -> None:
+    def made(*messages: bytes) -> list[bytes]:
+        transforms = Transforms()
+        for message in messages:
+            transforms.take("/ground_truth/leader/odom", ODOMETRY, message, 0)
+        return [found.cdr for found in transforms.make() if found.topic.name == "/tf"]
+
+    assert made(first, second) == [*made(first), *made(second)]
+
+
+def test_a_pose_that_is_cut_off_is_left_out_behind_a_whole_one() -> None:
+    whole = odometry_cdr(3, 0.1, "leader/base_link")
+    transforms = Transforms()
+    for message in (whole, whole[:-8], whole[:40], b"\0\1", whole):
+        transforms.take("/ground_truth/leader/odom", ODOMETRY, message, 0)
+    assert len([found for found in transforms.make() if found.topic.name == "/tf"]) == 2
+
+
 def test_fixed_frames_that_come_later_are_told_with_all_others() -> None:
     made = Transforms()
     description = robot_description("leader", WorldParameters(), camera=True)
