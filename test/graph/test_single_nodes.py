@@ -103,9 +103,9 @@ def test_ctrl_c_while_a_node_still_starts_is_not_lost(tmp_path: Path) -> None:
 def test_strangers_drive_a_robot_and_its_camera_in_a_world_of_their_own(lab: Lab, tmp_path: Path) -> None:
     recorder = lab.start("recorder", "-p", f"path:={tmp_path / 'bag'}")
     lab.start("world", "-p", "surface:=plane", "-p", "camera.mode:=on_demand", "-p", "recorder:=recorder")
-    joint_states = lab.collect(names.joint_states("leader"))
+    joint_states = lab.collect(names.joint_states("leader"), by="drive")
     truths = lab.collect(names.ground_truth_pose("leader"))
-    images = lab.collect(names.camera_image("follower_1"))
+    images = lab.collect(names.camera_image("follower_1"), by="block_detector")
     commands = lab.publisher(names.joint_commands("leader"))
     requests = lab.publisher(names.camera_request("follower_1"))
     lab.until(lambda: len(truths) == 1)
@@ -147,7 +147,7 @@ def test_bad_wheel_commands_move_nothing_and_are_said(lab: Lab) -> None:
 def test_drive_stop_ends_a_move_and_leader_stop_pauses_the_track(lab: Lab) -> None:
     lab.start("world", "-p", "real_time_factor:=1.0", "-p", "wait_for_listeners_s:=0.0", "-p", "camera.mode:=on_demand")
     lab.start("drive", namespace="/leader")
-    moved = lab.collect(names.MOVED, namespace="/leader")
+    moved = lab.collect(names.MOVED, namespace="/leader", by="leader")
     joint_states = lab.collect(names.joint_states("leader"))
     moves = lab.publisher(names.MOVE, namespace="/leader")
     # The world waits for nobody here: what it says of the move is lost on whoever has not found it yet.
@@ -162,9 +162,9 @@ def test_drive_stop_ends_a_move_and_leader_stop_pauses_the_track(lab: Lab) -> No
 
 def test_the_leader_pauses_and_goes_on(lab: Lab) -> None:
     lab.start("leader", "-p", "timesteps:=2", "-p", "wait_for_listeners_s:=600.0", namespace="/leader")
-    ticks = lab.collect(names.formation_done("leader"))
+    ticks = lab.collect(names.formation_done("leader"), by="fine_tuner")
     health = lab.collect(names.DIAGNOSTICS)
-    moves = lab.collect(names.MOVE, namespace="/leader")
+    moves = lab.collect(names.MOVE, namespace="/leader", by="drive")
     lab.until(lambda: ticks)
     done = lab.publisher(names.formation_done("follower_1"))
     assert lab.call("/leader/stop").success

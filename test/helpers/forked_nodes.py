@@ -17,6 +17,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import cv2  # noqa: F401  it changes LD_LIBRARY_PATH: before the server of the nodes takes that over
+
 from graph_tools import STRICT
 from node_server import MOST_BYTES
 from robot_formation.launching.environment import node_environment

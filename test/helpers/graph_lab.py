@@ -43,10 +43,12 @@ class Lab:
         self.node = Node("stranger", context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
+        self._listeners: dict[str, Node] = {}
 
     def leave(self) -> None:
         self.executor.shutdown()
-        self.node.destroy_node()
+        for node in (self.node, *self._listeners.values()):
+            node.destroy_node()
         rclpy.shutdown(context=self.context)
 
     def rejoin(self) -> None:
@@ -84,11 +86,19 @@ class Lab:
             assert time.monotonic() < end, "the condition did not come true"
             self.executor.spin_once(0.05)
 
-    def collect(self, topic: Topic, namespace: str = "") -> list[Any]:
+    def collect(self, topic: Topic, namespace: str = "", *, by: str = "") -> list[Any]:
+        """Collect a topic's messages; `by` names the node that listens, if its publisher waits for one of that name."""
         found: list[Any] = []
         kind = conversions.message_class(topic.type)
-        self.node.create_subscription(kind, absolute(namespace, topic.name), found.append, qos_profile(topic.qos))
+        node = self._listener(by) if by else self.node
+        node.create_subscription(kind, absolute(namespace, topic.name), found.append, qos_profile(topic.qos))
         return found
+
+    def _listener(self, name: str) -> Node:
+        if name not in self._listeners:
+            self._listeners[name] = Node(name, context=self.context)
+            self.executor.add_node(self._listeners[name])
+        return self._listeners[name]
 
     def publisher(self, topic: Topic, namespace: str = "") -> Publisher:
         kind = conversions.message_class(topic.type)

@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -41,6 +42,8 @@ ROS = re.compile(
     r"rclpy|rcl_interfaces|rosidl\w*|\w+_msgs|\w+_srvs|builtin_interfaces|ament_index_python|launch(_ros)?"
 )
 
+pytestmark = pytest.mark.xdist_group("layers")  # all ask for the same graph, which takes seconds
+
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 
@@ -54,6 +57,7 @@ def name_of(file: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+@cache
 def exists(module: str) -> bool:
     if not re.fullmatch(r"robot_formation(\.\w+)+", module):
         return False
@@ -89,15 +93,24 @@ def imports(file: Path, *, for_types: bool = True) -> Iterator[str]:
                 yield inner if module.startswith("robot_formation") and exists(inner) else module
 
 
-# What the package itself names for type checkers only, it imports when it is asked for it: names of "api", at the top.
-GRAPH = {name_of(file): set(imports(file, for_types=name_of(file) != PACKAGE.name)) for file in FILES}
-OWN = {module: {name for name in found if name.split(".")[0] == "robot_formation"} for module, found in GRAPH.items()}
+@cache
+def graph() -> dict[str, set[str]]:
+    """What each module of the package imports.
+
+    What the package itself names for type checkers only, it imports when it is asked for it: names of "api", at the
+    top.
+    """
+    return {name_of(file): set(imports(file, for_types=name_of(file) != PACKAGE.name)) for file in FILES}
 
 
-RUNTIME = {
-    name_of(file): {name for name in imports(file, for_types=False) if name.split(".")[0] == "robot_formation"}
-    for file in FILES
-}
+@cache
+def own() -> dict[str, set[str]]:
+    """What of the package each of its modules imports."""
+    return {module: {name for name in found if is_own(name)} for module, found in graph().items()}
+
+
+def is_own(module: str) -> bool:
+    return module.split(".")[0] == PACKAGE.name
 
 
 def reachable(module: str) -> set[str]:
@@ -108,34 +121,35 @@ def reachable(module: str) -> set[str]:
         current = todo.pop()
         if current not in seen:
             seen.add(current)
-            todo += OWN.get(current, ())
+            todo += own().get(current, ())
     return seen
 
 
 def test_every_part_of_the_package_has_its_layer() -> None:
-    assert {area_of(module) for module in GRAPH} <= set(LEVEL)
+    assert {area_of(module) for module in graph()} <= set(LEVEL)
 
 
 def test_imports_run_downward_only() -> None:
-    pairs = {(module, name) for module, names in OWN.items() for name in names}
+    pairs = {(module, name) for module, names in own().items() for name in names}
     assert not {(module, name) for module, name in pairs if LEVEL[area_of(name)] > LEVEL[area_of(module)]}
 
 
 def test_no_modules_import_each_other_in_a_circle_lazily_or_not() -> None:
-    graph = {module: {name for name in names if name in OWN and name != module} for module, names in RUNTIME.items()}
+    found = {name_of(file): set(imports(file, for_types=False)) for file in FILES}
+    others = {module: {name for name in names if name in found and name != module} for module, names in found.items()}
     try:
-        list(TopologicalSorter(graph).static_order())
+        list(TopologicalSorter(others).static_order())
     except CycleError as error:
         pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
 
 
 def test_only_nodes_and_conversions_import_ros() -> None:
-    importers = {module for module, names in GRAPH.items() if any(ROS.fullmatch(n.split(".")[0]) for n in names)}
+    importers = {module for module, names in graph().items() if any(ROS.fullmatch(n.split(".")[0]) for n in names)}
     assert {area_of(module) for module in importers} <= {"nodes", "conversions"}
 
 
 def test_only_the_world_imports_pybullet() -> None:
-    importers = {module for module, names in GRAPH.items() if any(n.split(".")[0] == "pybullet" for n in names)}
+    importers = {module for module, names in graph().items() if any(n.split(".")[0] == "pybullet" for n in names)}
     assert {area_of(module) for module in importers} <= {"world"}
 
 
@@ -147,7 +161,7 @@ def test_yaml_is_parsed_in_one_place() -> None:
 
 @pytest.mark.parametrize("area", [room for (room,) in LAYERS[1 : LAYERS.index(("conversions",))]])
 def test_these_parts_need_no_ros_not_even_indirectly(area: str) -> None:
-    modules = [module for module in GRAPH if area_of(module) == area]
+    modules = [module for module in graph() if area_of(module) == area]
     assert modules
     for module in modules:
         assert not [name for name in reachable(module) if area_of(name) in {"nodes", "conversions"}]
