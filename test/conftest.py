@@ -19,7 +19,7 @@ from robot_formation.paths import config_dir
 if TYPE_CHECKING:  # it imports rclpy
     from graph_lab import Lab
 
-pytest_plugins = ("hanging_tests", "crashed_workers")
+pytest_plugins = ("hanging_tests", "crashed_workers", "grouped_tests")
 
 MOST_ID = 100
 """How many characters of a value an id shows: as in pytest 9. Older ones have no limit; a picture had 40 million."""

@@ -17,6 +17,8 @@ from robot_formation.analysis.from_bag import load_displacements
 from robot_formation.cli.main import main
 from robot_formation.experiment.sweep import Plan, Row
 
+pytestmark = pytest.mark.xdist_group("plots")
+
 SAMPLE = ROOT / "bags" / "samples" / "track_two_formation"
 STEPS = np.array([[0.001 * (-1) ** t, 0.05 + 0.002 * t] for t in range(12)])
 

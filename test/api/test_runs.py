@@ -16,6 +16,8 @@ from robot_formation.cli.main import main
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.run_result import RunError
 
+pytestmark = pytest.mark.xdist_group("api_runs")
+
 SAMPLE = ROOT / "bags" / "samples" / "track_two_formation"
 SHORT = rf.load_scenario("track_two").changed(seed=3, predictor="measured", camera="on_demand", timesteps=5)
 COMMAND = "run --track two --seed 3 --predictor measured --camera on_demand --set leader.timesteps=5 --in-process"

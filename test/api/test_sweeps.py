@@ -17,6 +17,8 @@ from robot_formation.experiment import sweep as sweeps
 from robot_formation.experiment import sweep_runs
 from robot_formation.plugins import PluginError
 
+pytestmark = pytest.mark.xdist_group("api_sweeps")
+
 # A scenario unlike any track: its own place, ground, predictor's parameter and mode.
 SCENARIO = rf.load_scenario("track_one").changed(
     timesteps=4,

@@ -19,6 +19,8 @@ from robot_formation.bag.reader import read_bag
 from robot_formation.bag.writer import BagWriter
 from robot_formation.cli.main import main
 
+pytestmark = pytest.mark.xdist_group("formation_bag")
+
 SAMPLE = ROOT / "bags" / "samples" / "track_two_measured"
 
 

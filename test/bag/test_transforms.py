@@ -21,6 +21,8 @@ from robot_formation.world.description import robot_description
 from robot_formation.world.parameters import WorldParameters
 from synthetic_bag import STORE, odometry, text
 
+pytestmark = pytest.mark.xdist_group("bag_transforms")
+
 ODOMETRY, STRING = "nav_msgs/msg/Odometry", "std_msgs/msg/String"
 
 

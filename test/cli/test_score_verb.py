@@ -14,7 +14,7 @@ import pytest
 from graph_tools import alive
 from robot_formation.experiment import score
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("score_verb")]
 
 LAST = """
 class Last:

@@ -16,6 +16,8 @@ from robot_formation.experiment import sweep, sweep_runs
 from robot_formation.experiment.sweep import Plan, Row, SweepError, Table, Task
 from robot_formation.koopman.predictors import NAMES
 
+pytestmark = pytest.mark.xdist_group("sweep")
+
 SHORT = ("leader.timesteps=4",)
 PLAN = Plan(("two",), ("plane",), ("previous", "ideal+close"), (1000, 1001), SHORT)
 NUMBERS = [field.name for field in fields(Row)][7:]

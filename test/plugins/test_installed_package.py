@@ -12,6 +12,8 @@ import pytest
 from examples import install_example
 from repository import ROOT
 
+pytestmark = pytest.mark.xdist_group("installed_package")
+
 EXAMPLE = ROOT / "examples" / "own_classes"
 SHORT = ("--set", "leader.timesteps=4", "--camera", "on_demand")
 

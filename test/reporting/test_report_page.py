@@ -28,6 +28,8 @@ from robot_formation.reporting.sweep_sections import repeating_command
 from robot_formation.reporting.words import answer, how_it_was_held, what_was_run
 from synthetic_bag import STEPS, write_run
 
+pytestmark = pytest.mark.xdist_group("report_page")
+
 VOID = {"meta", "link", "br", "img"}
 HOSTS = r"(?:[\w.-]*\.)?(?:arxiv|doi|github)\.\w+"
 EVIL = "<script>alert('&1')</script>"

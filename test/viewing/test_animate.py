@@ -24,6 +24,8 @@ from robot_formation.viewing.animation_file import AnimationError, write_mp4
 from robot_formation.viewing.recorded_scene import RecordedScene
 from robot_formation.viewing.replayed_camera import ReplayedCamera
 
+pytestmark = pytest.mark.xdist_group("animate")
+
 SAMPLE = ROOT / "bags" / "samples" / "track_two_formation"
 PICTURES = ROOT / "bags" / "samples" / "pictures"
 SECOND = 10**9

@@ -17,6 +17,8 @@ from robot_formation.geometry.slots import slot
 from robot_formation.viewing.live_moments import LiveMoments
 from robot_formation.viewing.run_moments import RunMoments
 
+pytestmark = pytest.mark.xdist_group("moments")
+
 FOLLOWER = names.follower(1)
 SAMPLE = ROOT / "bags" / "samples" / "track_two_formation"
 

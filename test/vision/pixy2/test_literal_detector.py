@@ -27,11 +27,16 @@ def pair(name: str) -> tuple[BlockDetector, LiteralDetector]:
 
 
 @pytest.mark.parametrize(
-    "name", ["default", *(pytest.param(n, marks=pytest.mark.long) for n in ("paper", "wide and few"))]
+    ("name", "seeds"),
+    [
+        ("default", range(112)),
+        pytest.param("default", range(112, 336), marks=pytest.mark.long),
+        *(pytest.param(name, range(336), marks=pytest.mark.long) for name in ("paper", "wide and few")),
+    ],
 )
-def test_random_pictures_give_the_segments_and_boxes_of_the_literal_reading(name: str) -> None:
+def test_random_pictures_give_the_segments_and_boxes_of_the_literal_reading(name: str, seeds: range) -> None:
     fast, literal = pair(name)
-    for seed in range(336):
+    for seed in seeds:
         image = random_picture(np.random.default_rng(seed))
         assert row_segments(fast, image) == literal.row_segments(image), f"segments, seed {seed}"
         boxes = [(box.signature, box.left, box.right, box.top, box.bottom) for box in fast.detect(image)]
