@@ -100,7 +100,7 @@ except KeyboardInterrupt:
     assert (completed.returncode, completed.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("closed", ["1", "2", "12", "012"])
+@pytest.mark.parametrize("closed", ["1", *(pytest.param(n, marks=pytest.mark.long) for n in ("2", "12")), "012"])
 def test_closed_streams_leave_the_exit_code_and_the_bag_alone(tmp_path: Path, closed: str) -> None:
     bag = tmp_path / "bag"
     closing = " ".join(f"{number}>&-" for number in closed)

@@ -95,8 +95,18 @@ def test_a_bag_that_cannot_be_written_is_said(capsys: pytest.CaptureFixture[str]
     assert "file" in complaint(capsys, "run", "--in-process", "--bag", tmp_path / "file" / "bag")
 
 
-@pytest.mark.parametrize("track", ["one", "two"])
-@pytest.mark.parametrize("predictor", ["previous", "literal", "measured"])
+@pytest.mark.parametrize(
+    ("track", "predictor"),
+    [
+        ("one", "previous"),
+        ("two", "literal"),
+        ("two", "measured"),
+        *(
+            pytest.param(*case, marks=pytest.mark.long)
+            for case in (("one", "literal"), ("one", "measured"), ("two", "previous"))
+        ),
+    ],
+)
 def test_every_track_and_predictor_ends_with_a_documented_code_and_a_whole_bag(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, track: str, predictor: str
 ) -> None:

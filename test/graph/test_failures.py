@@ -114,7 +114,7 @@ def test_a_lost_leader_ends_the_run_in_good_order(tmp_path: Path) -> None:
     assert analyse(load_run(tmp_path / "bag")).outcome == "lost"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_an_interrupted_run_closes_its_bag_and_leaves_no_process(tmp_path: Path, number: signal.Signals) -> None:
     bag = tmp_path / "bag"
     command = [sys.executable, "-m", "robot_formation.cli", "run", "--camera", "on_demand", "--json"]
