@@ -103,11 +103,11 @@ class Transforms:
                 fixed = list(_of_description(robot, message.data))
             else:
                 transform = _of_odometry(message)
-                made_message = _message(_inside(namespace, names.TF), [transform], stamp_ns)
-                if (places := layout(cdr)) is not None:
-                    self._templates[namespace, robot] = _Template(cdr, places, made_message.cdr)
-                yield made_message
+                first = _message(_inside(namespace, names.TF), [transform], stamp_ns)
+                yield first
                 fixed = [_transform(message.header, f"{robot}/{names.ODOM_FRAME}", transform.transform)]
+                if (places := layout(cdr)) is not None:
+                    self._templates[namespace, robot] = _Template(cdr, places, first.cdr)
             for transform in fixed:
                 if transform.child_frame_id not in self._static[namespace]:
                     self._static[namespace][transform.child_frame_id] = transform

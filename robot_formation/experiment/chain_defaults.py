@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robot_formation.schedule.schedules import Schedule, Spacing
+from robot_formation.vision.marker import MarkerKind
 from robot_formation.world.parameters import MarkerParameters
 
 _DARK = {"marker.backdrop_rgb": (12, 12, 13)}
@@ -44,7 +45,8 @@ def backdrop(followers: int, spacing: Spacing, own: Mapping[str, object]) -> dic
 def edges_before_board(marker: MarkerParameters, own: Mapping[str, object]) -> dict[str, float]:
     """Return the fine-tuner's parameters of how the edges of a marker before its board are reported."""
     light = marker.backdrop_m > 0.0 and min(marker.backdrop_rgb) >= _LEAST_LIGHT
-    return {name: value for name, value in _BEFORE_LIGHT_BOARD.items() if light and name not in own}
+    biased = light and marker.kind is MarkerKind.COLOURS  # a tag's box is that of its face
+    return {name: value for name, value in _BEFORE_LIGHT_BOARD.items() if biased and name not in own}
 
 
 def chain_tolerances(followers: int, schedule: Schedule, own: Mapping[str, object]) -> dict[str, float]:

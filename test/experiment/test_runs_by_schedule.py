@@ -198,6 +198,7 @@ def test_edges_before_a_light_board_are_known() -> None:
     assert bottom_px("followers=2") < alone - 0.5
     assert bottom_px("followers=2", "schedule=timer", "spacing=delayed") == alone  # a dark board
     assert bottom_px("followers=2", "world.marker.backdrop_m=0") == alone
+    assert bottom_px("followers=2", "marker=tags") == bottom_px("followers=1", "marker=tags") == 0.0
     assert bottom_px("followers=2", "fine_tuner.precise.edges.target_bottom_px=-1") == -1.0
     late = analysed("followers=2").followers[0].timesteps[3:]
     off_u_m = [t.error_uv_m[0] for t in late if t.error_uv_m is not None]

@@ -17,6 +17,10 @@ class Listeners:
 
     def __init__(self, *names: str) -> None:
         self._names = names
+        self.published: list[str] = []
+
+    def publish(self, message: str) -> None:
+        self.published.append(message)
 
     def get_subscriptions_info_by_topic(self, topic: str) -> list[SimpleNamespace]:
         assert topic == self.topic_name
@@ -47,3 +51,28 @@ def test_only_a_node_of_the_users_stands_in_for_the_predictor(
     outbox.add(DISPLACEMENT, node)
     assert outbox._matched(DISPLACEMENT) == matched
     assert outbox._stood_in(DISPLACEMENT) == stood_in
+
+
+@pytest.mark.parametrize(
+    ("subscribers", "sent_after_s"),
+    [(("predictor",), 0.0), (("my_predictor",), 5.0), (("progress",), 60.0), ((), 60.0)],
+)
+def test_a_first_message_waits_for_its_listener_a_while_for_a_stand_in_and_no_longer_than_patience_lasts(
+    monkeypatch: pytest.MonkeyPatch, subscribers: Sequence[str], sent_after_s: float
+) -> None:
+    warnings: list[str] = []
+    now_s = [100.0]
+    monkeypatch.setattr("robot_formation.nodes.host.outbox.time", SimpleNamespace(monotonic=lambda: now_s[0]))
+    node: Any = Listeners(*subscribers)
+    outbox = Outbox(node, patience_s=60.0, recorder="", record_images=False, warn=warnings.append)
+    outbox.add(DISPLACEMENT, node)
+    outbox.send(DISPLACEMENT, "first")
+    for waited_s in range(62):
+        if node.published:
+            break
+        now_s[0] = 100.0 + waited_s
+        outbox.flush()
+    assert sent_after_s <= now_s[0] - 100.0 <= sent_after_s + 1.0
+    assert bool(warnings) == (sent_after_s > 0.0)
+    outbox.send(DISPLACEMENT, "second")
+    assert node.published == ["first", "second"]

@@ -23,7 +23,7 @@ from robot_formation.surface import make_surface, plate_size, surface_from_texts
 from robot_formation.surface.outside import completed_surface
 from robot_formation.testing import check_path, check_predictor, check_sensor, check_surface
 from robot_formation.vision.pixy2.parameters import DetectorParameters
-from robot_formation.vision.sensors import made_sensor
+from robot_formation.vision.sensors import is_outside_sensor, made_sensor
 
 STEP = np.array([0.01, 0.05, 0.1])
 
@@ -35,6 +35,15 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setattr(sys, "path", [entry for entry in sys.path if entry])
     yield tmp_path / "mine.py"
     sys.modules.pop("mine", None)
+
+
+def test_an_entry_point_does_not_take_the_name_of_one_of_the_packages_own_sensors(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = {name: plugins.Plugin(name, "mine:Sensor", "mine 1") for name in ("tags", "other")}
+    monkeypatch.setattr(plugins, "installed", lambda kind: found)
+    assert not is_outside_sensor("tags")
+    assert is_outside_sensor("other")
 
 
 class Least:

@@ -65,8 +65,20 @@ _ASIDE_RAD = 0.25
 class PreciseParameters:
     """Tolerances and bounds of `mode: precise`, and what its estimate knows of camera, marker, detector and moves."""
 
-    u_tolerance_m: float = parameter(0.009, "Offset along u that is left alone", unit="m", low=0.0005, high=0.1)
-    v_tolerance_m: float = parameter(0.006, "Offset along v that is left alone", unit="m", low=0.0005, high=0.1)
+    u_tolerance_m: float = parameter(
+        0.009,
+        "Offset along u that is left alone. A scenario with two followers and more, in turns or wave, sets 0.005",
+        unit="m",
+        low=0.0005,
+        high=0.1,
+    )
+    v_tolerance_m: float = parameter(
+        0.006,
+        "Offset along v that is left alone. A scenario with two followers and more, in turns or wave, sets 0.004",
+        unit="m",
+        low=0.0005,
+        high=0.1,
+    )
     heading_tolerance_rad: float = parameter(
         math.radians(3.0), "Heading error that is left to the next prediction move", unit="rad", low=0.001, high=1.0
     )
