@@ -24,8 +24,6 @@ from robot_formation.names import Message
 _POSES = re.compile(r"(.*)/ground_truth/([^/]+)/odom")
 _DESCRIPTIONS = re.compile(r"(.*)/([^/]+)/robot_description")
 _STRING = "std_msgs/msg/String"
-_BODY = 4  # where a serialised message begins, behind its byte order
-_TIME = 8  # where a transform's time lies in its message
 
 _MOST_CHARACTERS = 10_000_000
 _TOPICS = 1024  # more than any recording has: of so many is kept what their names mean
@@ -48,18 +46,13 @@ class _Template(NamedTuple):
 
     def of(self, odometry: bytes) -> bytes | None:
         """Return the transform of another true pose; None if that differs in more."""
-        own, (first, second) = self.odometry, self.places.frames
-        alike = (
-            len(odometry) == len(own)
-            and odometry[:_BODY] == own[:_BODY]
-            and odometry[first] == own[first]
-            and odometry[second] == own[second]
-        )
-        if not alike:
+        time, frames, pose = self.places
+        same = (slice(time.start), *frames)
+        if len(odometry) != len(self.odometry) or any(odometry[part] != self.odometry[part] for part in same):
             return None
-        # The number of transforms, 1; then header, child frame, and the pose's seven numbers in their order.
-        pose, made = odometry[self.places.pose], self.transform
-        return made[:_TIME] + odometry[self.places.time] + made[_TIME + 8 : -len(pose)] + pose
+        # The number of transforms comes before the time; the frames follow, and the pose's numbers in the same order.
+        before, between = self.transform[: time.start + 4], self.transform[time.stop + 4 : pose.start - pose.stop]
+        return before + odometry[time] + between + odometry[pose]
 
 
 class Transforms:

@@ -1,18 +1,14 @@
 """Tests that hang or end their process fail by their names, and no other test is lost."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from repository import HELPERS
+from inner_pytest import run_pytest
 
 pytestmark = pytest.mark.long
 
-PLAIN = ("-p", "no:launch_testing", "-p", "no:launch_ros", "-p", "no:cacheprovider")
 CONFTEST = """
 import hanging_tests
 hanging_tests.GRACE_S = 1.0
@@ -67,10 +63,7 @@ def test_each_fails_by_its_name_and_all_others_are_run(tmp_path: Path, cores: in
         pytest.importorskip(module)
     (tmp_path / "conftest.py").write_text(CONFTEST)
     (tmp_path / "test_these.py").write_text(TESTS)
-    (tmp_path / "pytest.ini").write_text(f"[pytest]\npythonpath = {HELPERS}\n")
-    command = [sys.executable, "-m", "pytest", *PLAIN, "-rA", "-n", str(cores), "--dist", "loadgroup", "--timeout", "2"]
-    environment = {name: text for name, text in os.environ.items() if not name.startswith("PYTEST_")}
-    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+    result = run_pytest(tmp_path, "-rA", "-n", str(cores), "--dist", "loadgroup", "--timeout", "2")
     ended: dict[str, set[str]] = {outcome: set() for outcome in ("FAILED", "PASSED", "ERROR")}
     for outcome, name in re.findall(
         r"^(FAILED|PASSED|ERROR) test_these.py::(\w+(?:\[\d\])?)", result.stdout, re.MULTILINE
@@ -94,9 +87,6 @@ def test_processes_that_die_after_their_last_test_fail_the_run(tmp_path: Path) -
     dying = "import os\ndef pytest_sessionfinish(session):\n    if 'PYTEST_XDIST_WORKER' in os.environ: os._exit(9)\n"
     (tmp_path / "conftest.py").write_text(f'pytest_plugins = ("crashed_workers",)\n{dying}')
     (tmp_path / "test_these.py").write_text("def test_one(): pass\ndef test_two(): pass\n")
-    (tmp_path / "pytest.ini").write_text(f"[pytest]\npythonpath = {HELPERS}\n")
-    command = [sys.executable, "-m", "pytest", *PLAIN, "-n", "2", "--dist", "loadgroup"]
-    environment = {name: text for name, text in os.environ.items() if not name.startswith("PYTEST_")}
-    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+    result = run_pytest(tmp_path, "-n", "2", "--dist", "loadgroup")
     assert "2 passed" in result.stdout
     assert result.returncode != 0
