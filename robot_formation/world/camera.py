@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_formation.surface import Surface
-from robot_formation.world.parameters import CameraParameters, WorldParameters
+from robot_formation.world.occlusion import Occlusion, view_bounds
+from robot_formation.world.parameters import WorldParameters
 from robot_formation.world.pose import Pose
 from robot_formation.world.scene import FULL, Colour, RobotFaces, Scene
 
@@ -49,8 +50,8 @@ class Camera:
         self._canvas = np.empty((p.height_px * SUPERSAMPLING, p.width_px * SUPERSAMPLING, 3), np.uint16)
         self._sharp = np.empty((p.height_px, p.width_px, 3), np.uint16)
         self._blurred = np.empty((p.height_px, p.width_px, 3), np.float32)
-        self._bounds = _view_bounds(p)
-        self._unit_bounds = self._bounds / np.linalg.norm(self._bounds, axis=1, keepdims=True)
+        self._bounds = view_bounds(p)
+        self._occlusion = Occlusion(self._scene, parameters)
 
     def optical_frame(self, robot: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rotation (3, 3) from the world to the optical frame (x right, y down, z ahead) and the lens's place (3,)."""
@@ -65,8 +66,8 @@ class Camera:
         return np.asarray(local[:, :2] / local[:, 2:] * p.focal_length_px + np.array([p.centre_x_px, p.centre_y_px]))
 
     def may_see(self, robot: Pose, others: Sequence[Pose]) -> list[Pose]:
-        """List those of other robots of which something may be in a robot's view; the picture is of no others."""
-        return self._in_view(others, *self.optical_frame(robot))
+        """List those of other robots of which something may be in a picture, far to near; it is of no others."""
+        return self._occlusion.seen(others, *self.optical_frame(robot))
 
     def light(self, robot: Pose, others: Sequence[Pose]) -> Light:
         """Light on the sensor, uint16 (rows, columns, 3) red, green, blue, of a robot that sees robots at `others`.
@@ -76,10 +77,7 @@ class Camera:
         p = self.parameters
         rotation, lens = self.optical_frame(robot)
         faces = self._plate(rotation, lens)
-        seen = self._in_view(others, rotation, lens)
-        if len(seen) > 1:
-            seen.sort(key=lambda pose: -float(np.sum((np.asarray(pose.position) - lens) ** 2)))
-        for other in seen:
+        for other in self._occlusion.seen(others, rotation, lens):
             faces += self._robot(self._scene.robot_faces(other, lens), rotation, lens)
         first = self._first_row(faces)
         canvas = self._canvas[SUPERSAMPLING * first :]
@@ -91,15 +89,6 @@ class Camera:
         self._sample(canvas, light[first:])
         light[:first] = light[first]
         return light
-
-    def _in_view(self, others: Sequence[Pose], rotation: NDArray[np.float64], lens: NDArray[np.float64]) -> list[Pose]:
-        radius = self._scene.robot_radius_m
-        found = []
-        for other in others:
-            middle = rotation @ (other.matrix() @ self._scene.robot_middle + other.position - lens)
-            if middle[2] > self.parameters.near_m - radius and (self._unit_bounds @ middle).min() > -radius:
-                found.append(other)
-        return found
 
     def _plate(self, rotation: NDArray[np.float64], lens: NDArray[np.float64]) -> list[_Face]:
         """List the patches of the plate that are in view, far to near."""
@@ -171,18 +160,6 @@ class Camera:
         np.copyto(blurred, sharp)
         cv2.GaussianBlur(blurred, (3, 3), blur_px, dst=blurred, borderType=cv2.BORDER_REPLICATE)
         np.copyto(light, np.rint(blurred, out=blurred), casting="unsafe")
-
-
-def _view_bounds(parameters: CameraParameters) -> NDArray[np.float64]:
-    """Inward normals (4, 3) of the planes through the lens that bound the view: left, right, top, bottom.
-
-    They leave a margin of two pixels, so that nothing at the picture's edge is taken for hidden.
-    """
-    p, margin = parameters, 2.5
-    left, top = p.centre_x_px + margin, p.centre_y_px + margin
-    right, bottom = p.width_px - 1 - p.centre_x_px + margin, p.height_px - 1 - p.centre_y_px + margin
-    f = p.focal_length_px
-    return np.array([[f, 0.0, left], [-f, 0.0, right], [0.0, f, top], [0.0, -f, bottom]])
 
 
 def clip_near(corners: NDArray[np.float64], near: float) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from robot_formation.surface import Surface
 from robot_formation.vision.marker import MarkerKind
-from robot_formation.world.parameters import WorldParameters
+from robot_formation.world.parameters import MarkerParameters, WorldParameters
 from robot_formation.world.pose import Pose
 from robot_formation.world.tag_faces import FACES, tag_rectangles
 
@@ -32,6 +32,17 @@ _SIDES: tuple[tuple[tuple[int, int, int, int], tuple[float, float, float]], ...]
     ((1, 3, 7, 5), (0.0, 0.0, 1.0)),
 )
 """Corner indices and normals: front, rear, left, right, top (the bottom is never seen)."""
+
+
+def board_y_m(marker: MarkerParameters) -> float:
+    """Y of the middle of the board behind the marker, in base_link."""
+    return 0.5 * (marker.edge_m + BACKDROP_THICKNESS_M)
+
+
+def _box_around(points: Array) -> Array:
+    """Corners (8, 3) of the box, along the axes, around points (n, 3)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.asarray(0.5 * (low + high) + _BOX * (high - low))
 
 
 class RobotFaces(NamedTuple):
@@ -58,6 +69,8 @@ class Scene:
         patch_light: red, green, blue of each patch.
         robot_middle: in the middle of a robot, (3,) in its base_link frame.
         robot_radius_m: farthest from there that any of its faces reaches.
+        robot_boxes: corners of the boxes around a robot's body and around what stands on it, (2, 8, 3) in its base_link
+            frame.
     """
 
     def __init__(self, surface: Surface, parameters: WorldParameters) -> None:
@@ -75,9 +88,7 @@ class Scene:
             self._add_box((PEDESTAL_M, PEDESTAL_M, foot - chassis.body_top_m), chassis.body_top_m, (grey,) * 5)
         if marker.backdrop_m > 0.0:
             board = (marker.backdrop_m, BACKDROP_THICKNESS_M, marker.top_m - chassis.body_top_m)
-            self._add_box(
-                board, chassis.body_top_m, (marker.backdrop_rgb,) * 5, y_m=0.5 * (marker.edge_m + BACKDROP_THICKNESS_M)
-            )
+            self._add_box(board, chassis.body_top_m, (marker.backdrop_rgb,) * 5, y_m=board_y_m(marker))
         target, front, rear = marker.face_colours
         self._add_box((marker.edge_m,) * 3, foot, (front, rear, grey, target, grey))
         if marker.kind is MarkerKind.TAGS:
@@ -108,6 +119,8 @@ class Scene:
         self._albedos = np.stack([albedo for _, _, albedo in self._faces])
         self._heights = np.array([normal @ corners[0] for corners, normal, _ in self._faces])
         self.robot_middle = 0.5 * (self._corners.min(axis=0) + self._corners.max(axis=0))
+        body = int(self._counts[: len(_SIDES)].sum())
+        self.robot_boxes = np.stack([_box_around(self._corners[:body]), _box_around(self._corners[body:])])
         self.robot_radius_m = float(np.linalg.norm(self._corners - self.robot_middle, axis=1).max())
 
     def over_patches(self, combine: np.ufunc, values: NDArray[_Value]) -> NDArray[_Value]:
