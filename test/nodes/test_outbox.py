@@ -34,13 +34,13 @@ class Listeners:
     ("subscribers", "matched", "stood_in"),
     [
         ((), False, False),
-        (("predictor",), True, True),
+        (("predictor",), True, False),
         (("my_predictor",), False, True),
         (("progress",), False, False),
         (("viewer",), False, False),
         (("_monitor",), False, False),
         (("progress", "my_predictor"), False, True),
-        (("progress", "predictor"), True, True),
+        (("progress", "predictor"), True, False),
     ],
 )
 def test_only_a_node_of_the_users_stands_in_for_the_predictor(
@@ -48,6 +48,25 @@ def test_only_a_node_of_the_users_stands_in_for_the_predictor(
 ) -> None:
     node: Any = Listeners(*subscribers)
     outbox = Outbox(node, patience_s=60.0, recorder="", record_images=False, warn=lambda text: None)
+    outbox.add(DISPLACEMENT, node)
+    assert outbox._matched(DISPLACEMENT) == matched
+    assert outbox._stood_in(DISPLACEMENT) == stood_in
+
+
+@pytest.mark.parametrize(
+    ("subscribers", "matched", "stood_in"),
+    [
+        (("predictor",), False, False),
+        (("predictor", "fine_tuner", "somebody"), False, False),
+        (("my_predictor",), False, False),
+        (("my_predictor", "recorder"), False, True),
+        (("predictor", "recorder"), True, False),
+    ],
+)
+def test_nobody_stands_in_for_the_recorder(subscribers: Sequence[str], matched: bool, stood_in: bool) -> None:
+    node: Any = Listeners(*subscribers)
+    recorder = "/follower_1/recorder"
+    outbox = Outbox(node, patience_s=60.0, recorder=recorder, record_images=False, warn=lambda text: None)
     outbox.add(DISPLACEMENT, node)
     assert outbox._matched(DISPLACEMENT) == matched
     assert outbox._stood_in(DISPLACEMENT) == stood_in

@@ -79,19 +79,32 @@ class Outbox:
     def _matched(self, topic: Topic) -> bool:
         """Return whether all listeners, the recorder and whoever else has subscribed have matched."""
         publisher = self._publishers[topic]
-        found = self._node.get_subscriptions_info_by_topic(publisher.topic_name)
+        found = self._subscriptions(topic)
         names = {info.node_name for info in found}
-        recorded = self._recorder and (self._record_images or topic.type != IMAGE_TYPE)
-        if recorded and self._recorder not in {_full_name(info) for info in found}:
-            return False
-        return names.issuperset(topic.listeners) and publisher.get_subscription_count() >= len(found)
+        return (
+            self._is_recorded(topic, found)
+            and names.issuperset(topic.listeners)
+            and publisher.get_subscription_count() >= len(found)
+        )
 
     def _stood_in(self, topic: Topic) -> bool:
-        """Return whether nodes of other names listen in place of those expected: a user's own predictor, say."""
-        found = self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name)
-        found = [info for info in found if _full_name(info) != self._recorder]
-        names = {info.node_name for info in found if not info.node_name.startswith("_")} - ONLOOKERS
-        return len(names) >= max(len(topic.listeners), 1)
+        """Return whether nodes of other names listen in place of those that are missing: a user's own predictor, say.
+
+        Nobody stands in for the recorder.
+        """
+        found = self._subscriptions(topic)
+        others = {info.node_name for info in found if _full_name(info) != self._recorder}
+        missing = set(topic.listeners) - others
+        others = {name for name in others if not name.startswith("_")} - ONLOOKERS - set(topic.listeners)
+        return self._is_recorded(topic, found) and 0 < len(missing) <= len(others)
+
+    def _subscriptions(self, topic: Topic) -> list[TopicEndpointInfo]:
+        return list(self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name))
+
+    def _is_recorded(self, topic: Topic, found: list[TopicEndpointInfo]) -> bool:
+        """Return whether the recorder listens, or need not."""
+        recorded = self._recorder and (self._record_images or topic.type != IMAGE_TYPE)
+        return not recorded or self._recorder in {_full_name(info) for info in found}
 
 
 def _full_name(info: TopicEndpointInfo) -> str:
