@@ -23,6 +23,7 @@ from robot_formation.schedule.schedules import Schedule
 from robot_formation.surface import Surface
 from robot_formation.world.description import robot_description
 from robot_formation.world.events import Event, Frame, JointStates, LeftPlate, RobotPose
+from robot_formation.world.picture_memory import keep_freed_memory
 from robot_formation.world.pushes import Push
 from robot_formation.world.world import World
 
@@ -38,6 +39,7 @@ class WorldComponent(Component):
 
     def __init__(self, parameters: WorldNodeParameters, place: Place) -> None:
         super().__init__(place)
+        keep_freed_memory()
         self._set_up(parameters, 0)
         self._next = parameters
         self._paused = False
