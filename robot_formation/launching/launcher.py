@@ -45,8 +45,6 @@ _CAUGHT_UP_REPORTS, _CATCH_UP_S = 3, 10.0
 _ORDERLY = (exit_codes.DONE, exit_codes.LOST)
 # How long the nodes may take after each signal. A run must be over within ten seconds of a node's death.
 _STOP_SIGNALS = ((signal.SIGINT, 3.0), (signal.SIGTERM, 1.0), (signal.SIGKILL, 1.0))
-_FEW_NODES = 10
-"""With more, all take proportionally longer: each tells each that its topics are gone."""
 RECORDER_PATIENCE_S = (10.0, 5.0)
 """How long the recorder may take after SIGINT and after SIGTERM, s."""
 _RECORDER_STOP_SIGNALS = (
@@ -295,9 +293,8 @@ class Launcher:
         self._end(recorders, _RECORDER_STOP_SIGNALS)
 
     def _end(self, children: list[Child], signals: tuple[tuple[signal.Signals, float], ...]) -> None:
-        factor = max(1.0, len(self._children) / _FEW_NODES)
         for number, patience_s in signals:
-            end = time.monotonic() + factor * patience_s
+            end = time.monotonic() + patience_s
             for child in children:
                 child.signal(number)
             interrupts = self._signals.count
