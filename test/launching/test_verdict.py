@@ -71,8 +71,17 @@ def test_a_recorder_that_failed_at_the_end_makes_it_a_failure(bag: Path, before:
 
 
 def test_a_recorder_that_had_to_be_killed_is_said_so(bag: Path) -> None:
+    bag.rename(bag.with_name("bag.partial"))
     result = judged(bag, child("/recorder", -signal.SIGKILL, forced=True))
     assert (result.exit_code, "had to be killed" in result.reason) == (4, True)
+
+
+@pytest.mark.parametrize("before", [0, 3])
+def test_a_recorder_that_hung_after_it_had_closed_its_bag_is_named_in_a_warning(bag: Path, before: int) -> None:
+    result = judged(bag, child("/recorder", -signal.SIGKILL, forced=True), result=RunResult(before, bag))
+    assert (result.exit_code, result.reason, result.bag) == (before, "", bag)
+    assert len(result.warnings) == 1
+    assert result.warnings[0].endswith("; its bag is whole")
 
 
 def test_a_bag_that_is_not_there_makes_it_a_failure(tmp_path: Path) -> None:
