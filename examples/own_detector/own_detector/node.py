@@ -19,6 +19,9 @@ class OwnDetector(Node):
 
     def __init__(self):
         super().__init__("block_detector")
+        # The run's parameter file names its recorder; not every run has one.
+        recorder = self.declare_parameter("recorder", "").value
+        self.listeners = {"fine_tuner"} | ({recorder.rpartition("/")[2]} if recorder else set())
         self.publisher = self.create_publisher(PointCloud2, "blocks", EVENT)
         # Pictures come as soon as they are subscribed to. Before that the answers must have found their listeners, or
         # the first ones get lost.
@@ -26,8 +29,7 @@ class OwnDetector(Node):
 
     def subscribe(self):
         known = [info.node_name for info in self.get_subscriptions_info_by_topic(self.publisher.topic_name)]
-        listeners = {"fine_tuner", *{"recorder"}.intersection(self.get_node_names())}  # not every run is recorded
-        if listeners <= set(known) and self.publisher.get_subscription_count() == len(known):
+        if self.listeners <= set(known) and self.publisher.get_subscription_count() == len(known):
             self.timer.cancel()
             self.create_subscription(Image, "camera/image_raw", self.on_picture, EVENT)
             self.get_logger().info("ready")
