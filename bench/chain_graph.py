@@ -68,6 +68,8 @@ def main() -> None:
     parser.add_argument("--timesteps", type=int, default=20)
     parser.add_argument("--rounds", type=int, default=2)
     args = parser.parse_args()
+    if args.timesteps <= _FIRST:
+        parser.error(f"--timesteps must be above {_FIRST}")
     print("| schedule | followers | start, s | s a timestep | end, s | times the first's | the same by N |")
     print("|---|---|---|---|---|---|---|")
     for schedule in args.schedules:

@@ -314,8 +314,8 @@ class Launcher:
                 if child not in self._needed:
                     result.warnings.append(f"node {child.name} {how}; the run does not need it")
                 elif failed and child.forced and self.bag is not None and self.bag.exists():
-                    # Its folder has its name only when it is whole. Fast DDS may deadlock when many nodes end at once
-                    # (its issue 6502: seen with 45 nodes, some run in five).
+                    # A bag's folder has its name only when it is whole. Fast DDS may deadlock when many nodes end at
+                    # once (its issue 6502).
                     result.warnings.append(f"node {child.name} {how}; its bag is whole")
                 elif failed:
                     result.exit_code, result.reason = exit_codes.NODE_DIED, f"node {child.name} {how}"

@@ -34,13 +34,13 @@ class Listeners:
     ("subscribers", "matched", "stood_in"),
     [
         ((), False, False),
-        (("predictor",), True, False),
+        (("predictor",), True, True),
         (("my_predictor",), False, True),
         (("progress",), False, False),
         (("viewer",), False, False),
         (("_monitor",), False, False),
         (("progress", "my_predictor"), False, True),
-        (("progress", "predictor"), True, False),
+        (("progress", "predictor"), True, True),
     ],
 )
 def test_only_a_node_of_the_users_stands_in_for_the_predictor(
@@ -60,7 +60,7 @@ def test_only_a_node_of_the_users_stands_in_for_the_predictor(
         (("predictor", "fine_tuner", "somebody"), False, False),
         (("my_predictor",), False, False),
         (("my_predictor", "recorder"), False, True),
-        (("predictor", "recorder"), True, False),
+        (("predictor", "recorder"), True, True),
     ],
 )
 def test_nobody_stands_in_for_the_recorder(subscribers: Sequence[str], matched: bool, stood_in: bool) -> None:

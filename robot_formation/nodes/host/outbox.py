@@ -88,15 +88,16 @@ class Outbox:
         )
 
     def _stood_in(self, topic: Topic) -> bool:
-        """Return whether nodes of other names listen in place of those that are missing: a user's own predictor, say.
+        """Return whether others listen in place of those that are missing, if any: a user's own predictor, say.
 
-        Nobody stands in for the recorder.
+        Nobody stands in for the recorder. Where nobody is missing, a subscriber has not matched, and perhaps never will
+        (an incompatible quality of service).
         """
         found = self._subscriptions(topic)
         others = {info.node_name for info in found if _full_name(info) != self._recorder}
         missing = set(topic.listeners) - others
         others = {name for name in others if not name.startswith("_")} - ONLOOKERS - set(topic.listeners)
-        return self._is_recorded(topic, found) and 0 < len(missing) <= len(others)
+        return self._is_recorded(topic, found) and len(missing) <= len(others)
 
     def _subscriptions(self, topic: Topic) -> list[TopicEndpointInfo]:
         return list(self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name))
