@@ -13,6 +13,9 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from robot_formation.names import IMAGE_TYPE, ONLOOKERS, Message, Topic, absolute
 
 _STAND_IN_S = 5.0
+_UNMATCHED_S = 20.0
+"""Subscribers that have been seen match so much later at most where 40 nodes start at once; one with an incompatible
+quality of service never does."""
 
 
 class Outbox:
@@ -68,7 +71,7 @@ class Outbox:
                 if self._since is None:
                     self._since = time.monotonic()
                 waited_s = time.monotonic() - self._since
-                if waited_s < self._patience_s and not (waited_s > _STAND_IN_S and self._stood_in(topic)):
+                if waited_s < self._patience_for(topic):
                     return
                 self._warn(f"nobody listens to {self._publishers[topic].topic_name}: going on")
             self._since = None
@@ -87,17 +90,18 @@ class Outbox:
             and publisher.get_subscription_count() >= len(found)
         )
 
-    def _stood_in(self, topic: Topic) -> bool:
-        """Return whether others listen in place of those that are missing, if any: a user's own predictor, say.
+    def _patience_for(self, topic: Topic) -> float:
+        """Return how long a first message waits, s: less where others listen in place of those that are missing.
 
-        Nobody stands in for the recorder. Where nobody is missing, a subscriber has not matched, and perhaps never will
-        (an incompatible quality of service).
+        That may be a user's own predictor, say. Nobody stands in for the recorder.
         """
         found = self._subscriptions(topic)
         others = {info.node_name for info in found if _full_name(info) != self._recorder}
         missing = set(topic.listeners) - others
         others = {name for name in others if not name.startswith("_")} - ONLOOKERS - set(topic.listeners)
-        return self._is_recorded(topic, found) and len(missing) <= len(others)
+        if not self._is_recorded(topic, found) or len(missing) > len(others):
+            return self._patience_s
+        return min(self._patience_s, _STAND_IN_S if missing else _UNMATCHED_S)
 
     def _subscriptions(self, topic: Topic) -> list[TopicEndpointInfo]:
         return list(self._node.get_subscriptions_info_by_topic(self._publishers[topic].topic_name))
