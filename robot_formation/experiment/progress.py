@@ -159,6 +159,11 @@ class Progress:
         return list(self._handlers)
 
     @property
+    def begun(self) -> bool:
+        """Whether a follower has finished a timestep."""
+        return any(len(self._heard[robot].timesteps) for robot in self._followers)
+
+    @property
     def complete(self) -> bool:
         """Whether every timestep has been told."""
         return all(self._heard[robot].told >= self._timesteps for robot in self._followers)

@@ -22,6 +22,9 @@ LEADER_NODE = names.under(names.LEADER, names.LEADER)
 WORLD_NODE = "/world"
 """The node that stands in for robots and ground."""
 _EVERY_S = 0.5
+_UNSEEN_S = 20.0
+"""How long a stand-in may remain unseen once the run has begun, for which it must have been there. It is seen within
+some 3 s; the middleware lists one that has died for 20 s."""
 
 
 def stand_ins_of(scenario: Scenario, asked: Iterable[str], source: str) -> tuple[str, ...]:
@@ -91,6 +94,7 @@ class StandIns:
         self._clock = clock
         self._began = clock()
         self._looked_at = -_EVERY_S + self._began
+        self._run_began: float | None = None
 
     @property
     def awaited(self) -> bool:
@@ -111,13 +115,16 @@ class StandIns:
             self._say(f"{node} was there")
         self._missing = []
 
-    def look(self, graph: Collection[str]) -> str:
+    def look(self, graph: Collection[str], *, begun: bool) -> str:
         """Update with the nodes of the graph; return why the run can't go on, or an empty text.
 
         Args:
             graph: full names of the nodes that are there.
+            begun: whether a follower has finished a timestep.
         """
         self._looked_at = self._clock()
+        if begun and self._run_began is None:
+            self._run_began = self._looked_at
         for node in [node for node in self._missing if node in graph]:
             self._missing.remove(node)
             self._present.append(node)
@@ -126,6 +133,8 @@ class StandIns:
         gone = [node for node in self._present if node not in graph]
         if gone:
             return f"node {gone[0]}, started elsewhere, is gone"
-        if self._missing and self._clock() - self._began > self._timeout_s:
+        if self._missing and self._run_began is not None and self._looked_at - self._run_began > _UNSEEN_S:
+            return f"node {self._missing[0]}, started elsewhere, has not been seen since the run began"
+        if self._missing and self._looked_at - self._began > self._timeout_s:
             return f"no node {' and no node '.join(self._missing)} appeared within {self._timeout_s:g} s"
         return ""

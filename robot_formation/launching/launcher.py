@@ -185,7 +185,7 @@ class Launcher:
             if ended is not None:
                 monitor.drain(_POLL_S, lambda: progress.complete)
                 return self._ended_by(ended, monitor)
-            reason = self._look(stand_ins, watchdog, monitor)
+            reason = self._look(stand_ins, watchdog, monitor, progress)
             if self._tour_ended(progress, monitor, gone=bool(reason)):
                 return exit_codes.DONE, ""
             if reason:
@@ -243,9 +243,9 @@ class Launcher:
             monitor.drain(_POLL_S, lambda: progress.complete)
         return progress.complete
 
-    def _look(self, stand_ins: StandIns, watchdog: Watchdog, monitor: Monitor) -> str:
+    def _look(self, stand_ins: StandIns, watchdog: Watchdog, monitor: Monitor, progress: Progress) -> str:
         """Return why the run can't go on, if it is time to look for that; the nodes stand while some are missing."""
-        if stand_ins.due and (reason := stand_ins.look(monitor.nodes())):
+        if stand_ins.due and (reason := stand_ins.look(monitor.nodes(), begun=progress.begun)):
             return reason
         if stand_ins.awaited or not watchdog.due:
             return ""

@@ -67,9 +67,9 @@ class Watched:
         self.said: list[str] = []
         self.stand_ins = StandIns(DETECTORS, timeout_s, self.said.append, lambda: self.now_s)
 
-    def look(self, *graph: str, after_s: float = 1.0) -> str:
+    def look(self, *graph: str, after_s: float = 1.0, begun: bool = False) -> str:
         self.now_s += after_s
-        return self.stand_ins.look(graph)
+        return self.stand_ins.look(graph, begun=begun)
 
 
 def test_each_that_appears_is_told_and_the_run_waits_for_the_last() -> None:
@@ -96,6 +96,20 @@ def test_one_that_goes_is_told_also_while_others_are_awaited() -> None:
     watched = Watched()
     watched.look(DETECTORS[0])
     assert watched.look() == f"node {DETECTORS[0]}, started elsewhere, is gone"
+
+
+def test_one_that_is_not_seen_although_the_run_has_begun_is_told_after_as_long_as_a_dead_one_is_listed() -> None:
+    watched = Watched(timeout_s=300.0)
+    one, other = DETECTORS
+    assert watched.look(one, after_s=100.0) == ""
+    assert watched.look(one, begun=True) == ""
+    assert watched.look(one, begun=True, after_s=20.0) == ""
+    missing = f"node {other}, started elsewhere, has not been seen since the run began"
+    assert watched.look(one, begun=True, after_s=0.1) == missing
+    watched = Watched(timeout_s=300.0)
+    watched.look(one, begun=True)
+    assert watched.look(*DETECTORS, begun=True, after_s=20.0) == ""
+    assert watched.look(*DETECTORS, begun=True, after_s=1000.0) == ""
 
 
 def test_the_graph_is_looked_at_now_and_then_and_never_without_stand_ins() -> None:

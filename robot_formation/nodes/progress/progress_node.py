@@ -73,13 +73,16 @@ class ProgressExecutable:
         try:
             while not stopped():
                 executor.spin_once(_IDLE_S)
-                if self._stand_ins.due and (reason := self._stand_ins.look(node_names(self._node))):
+                if self._stand_ins.due and (reason := self._look()):
                     print(reason, file=sys.stderr, flush=True)
                     return exit_codes.NODE_DIED
             self._drain(executor)
         finally:
             executor.shutdown()
         return exit_codes.DONE
+
+    def _look(self) -> str:
+        return self._stand_ins.look(node_names(self._node), begun=self._progress.begun)
 
     def _drain(self, executor: Executor) -> None:
         """Process what is still on its way: the last timestep's messages, mostly."""
