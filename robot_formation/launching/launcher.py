@@ -112,7 +112,7 @@ class Launcher:
             result = RunResult(exit_codes.NODE_DIED, self.bag)
             began = time.monotonic()
             try:
-                environment = node_environment(domain, folder)
+                environment = node_environment(domain, folder, len(list(self.scenario.hosts())))
                 if self.scenario.leader.path == Teleop.name:
                     self._tell(_how_to_drive(domain))
                 result.exit_code, result.reason = self._drive(folder, environment, result)

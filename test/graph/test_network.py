@@ -4,13 +4,14 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
 from graph_lab import DEADLINE_S, Lab
 from robot_formation import names
 from robot_formation.network import loopback
-from robot_formation.network.loopback import PROFILES, RANGE, stay_here, use_loopback
+from robot_formation.network.loopback import PROFILES, RANGE, stay_here, use_loopback, use_profile_for_many
 from robot_formation.paths import config_dir
 
 PROFILE = str(config_dir() / "loopback.xml")
@@ -86,10 +87,39 @@ print("found", flush=True)
 
 
 @on_graph
-def test_fourteen_participants_of_one_domain_find_each_other(lab: Lab) -> None:
-    process = lab.open([sys.executable, "-c", MANY], lab.environment)
+@pytest.mark.parametrize("many", [False, True], ids=["profile", "profile for many"])
+def test_fourteen_participants_of_one_domain_find_each_other(lab: Lab, tmp_path: Path, many: bool) -> None:
+    environment = dict(lab.environment)
+    if many:
+        use_profile_for_many(environment, tmp_path)
+        assert environment[PROFILES[0]] == str(tmp_path / "loopback_many.xml")
+    process = lab.open([sys.executable, "-c", MANY], environment)
     out, error = process.communicate(timeout=DEADLINE_S)
     assert out.endswith("found\n"), error
+    assert "XMLPARSER" not in error
+
+
+def test_the_profile_for_many_nodes_differs_in_three_values_only(tmp_path: Path) -> None:
+    environment = {RANGE: "SYSTEM_DEFAULT", **dict.fromkeys(PROFILES, PROFILE)}
+    use_profile_for_many(environment, tmp_path)
+    changed = tmp_path / "loopback_many.xml"
+    assert environment == {RANGE: "SYSTEM_DEFAULT", **dict.fromkeys(PROFILES, str(changed))}
+    before, after = (
+        [(entry.tag, (entry.text or "").strip()) for entry in ElementTree.parse(file).iter()]
+        for file in (PROFILE, changed)
+    )
+    tag = "{http://www.eprosima.com}"
+    assert [entry for entry in before if entry not in after] == [(f"{tag}count", "20"), (f"{tag}nanosec", "100000000")]
+    added = [(f"{tag}segment_size", "2097152"), (f"{tag}count", "8"), (f"{tag}nanosec", "300000000")]
+    assert [entry for entry in after if entry not in before] == added
+
+
+@pytest.mark.parametrize("own", [{}, dict.fromkeys(PROFILES, "/home/somebody/mine.xml")])
+def test_a_profile_of_the_users_own_stays_for_many_nodes_too(own: dict[str, str], tmp_path: Path) -> None:
+    environment = dict(own)
+    use_profile_for_many(environment, tmp_path)
+    assert environment == own
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("middleware", [{}, {"RMW_IMPLEMENTATION": "rmw_fastrtps_dynamic_cpp"}])
