@@ -54,10 +54,11 @@ class ForkServer:
     Args:
         environment: of the server and so of all nodes; an attribute too.
         log: file for what the server itself prints: errors.
+        farewell: whether nodes that are asked to end tell the graph, as `nodes.host.signals` says.
     """
 
-    def __init__(self, environment: Mapping[str, str], log: Path) -> None:
-        self.environment, self._log = environment, log
+    def __init__(self, environment: Mapping[str, str], log: Path, *, farewell: bool = True) -> None:
+        self.environment, self._log, self._farewell = environment, log, farewell
 
     def __enter__(self) -> ForkServer:
         self._stack = contextlib.ExitStack()
@@ -104,7 +105,8 @@ class ForkServer:
             RunError: if something can't be imported.
             NodeNotStartedError: if the server died or doesn't answer, or `give_up` said so.
         """
-        request = {"executable": executable, "arguments": list(arguments), "log": str(log)}
+        words = {"executable": executable, "arguments": list(arguments), "log": str(log)}
+        request = {**words, "farewell": self._farewell}
         with contextlib.suppress(BrokenPipeError):
             self._requests.write(json.dumps(request).encode() + b"\n")
             self._requests.flush()
@@ -177,7 +179,7 @@ def serve(requests: BinaryIO, answers: BinaryIO, launcher: int) -> int:
                 os._exit(0)
             requests.close()
             answers.close()
-            return _node(request["executable"], request["arguments"], request["log"], launcher)
+            return _node(request["executable"], request["arguments"], request["log"], launcher, request["farewell"])
         if os.waitpid(middle, 0)[1]:
             return exit_codes.NODE_DIED
     return exit_codes.DONE
@@ -202,7 +204,7 @@ def _forked_or_gone() -> int:
         os._exit(exit_codes.NODE_DIED)
 
 
-def _node(executable: str, arguments: list[str], log: str, launcher: int) -> int:
+def _node(executable: str, arguments: list[str], log: str, launcher: int, farewell: bool) -> int:
     """Be a node from here on; return its exit code."""
     os.setsid()
     nothing, output = os.open(os.devnull, os.O_RDONLY), os.open(log, os.O_WRONLY | os.O_APPEND)
@@ -214,7 +216,10 @@ def _node(executable: str, arguments: list[str], log: str, launcher: int) -> int
     setproctitle.setproctitle(" ".join(["robot_formation", *sys.argv]))
     die_with(launcher)
     from robot_formation.nodes import executables
+    from robot_formation.nodes.host.signals import end_without_farewell
 
+    if not farewell:
+        end_without_farewell(launcher)
     return int(getattr(executables, executable)())
 
 

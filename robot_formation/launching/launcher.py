@@ -28,6 +28,7 @@ from robot_formation.launching.view_announcement import Announcement
 from robot_formation.launching.watchdog import STOPPED, Watchdog, stopped_text
 from robot_formation.leader.paths import Teleop
 from robot_formation.names import ONLOOKERS, RECORDER
+from robot_formation.network.loopback import MANY_NODES
 from robot_formation.network.ros_domain import DomainReservation
 from robot_formation.network.shared_memory import clean_after_graph
 from robot_formation.schedule.schedules import Spacing
@@ -147,7 +148,8 @@ class Launcher:
         with contextlib.ExitStack() as stack:
             try:
                 # Two processes import ROS at the same time: that of the nodes, and this one.
-                with ForkServer(environment, folder / "fork_server.log") as server:
+                many = len(table) >= MANY_NODES
+                with ForkServer(environment, folder / "fork_server.log", farewell=not many) as server:
                     from robot_formation.nodes.progress.monitor import Monitor  # needs the environment of the wheels
 
                     # The monitor joins first: the nodes then know of it before they send anything.

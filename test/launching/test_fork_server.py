@@ -13,7 +13,9 @@ from graph_tools import alive, launch, short_scenario
 from robot_formation.experiment.run_result import RunError
 from robot_formation.launching.environment import node_environment
 from robot_formation.launching.fork_server import ForkServer, NodeNotStartedError
-from robot_formation.network.ros_domain import DomainReservation
+from robot_formation.network.ros_domain import DomainReservation, domain_ports
+from robot_formation.network.shared_memory import clean_after_graph, fast_dds_files, find_orphans
+from robot_formation.nodes.host import signals
 
 pytestmark = pytest.mark.graph
 
@@ -60,6 +62,37 @@ def test_a_killed_node_is_told_by_its_signal(tmp_path: Path, environment: dict[s
         pid = server.start("leader", RIGHT, touched(tmp_path / "leader"))
     os.kill(pid, signal.SIGKILL)
     assert ended(pid) == -signal.SIGKILL
+
+
+@pytest.mark.parametrize("farewell", [True, False])
+def test_a_node_without_farewell_leaves_its_shared_memory_to_the_launcher(
+    tmp_path: Path, environment: dict[str, str], farewell: bool
+) -> None:
+    domain, log = int(environment["ROS_DOMAIN_ID"]), touched(tmp_path / "log")
+    with ForkServer(environment, tmp_path / "server.log", farewell=farewell) as server:
+        pid = server.start("drive", RIGHT, log)
+    while "ready" not in log.read_text():
+        assert alive(pid)
+        time.sleep(0.01)
+    os.kill(pid, signal.SIGINT)
+    assert ended(pid) == 0
+    own = {f"fastrtps_port{port}" for port in domain_ports(domain)}
+    assert own.isdisjoint(find_orphans(domain)) is farewell
+    clean_after_graph(domain)
+    assert own.isdisjoint(fast_dds_files())
+
+
+def test_a_node_whose_launcher_is_gone_says_farewell(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(signals, "_launcher", None)
+    monkeypatch.setattr(signals, "stopped", lambda: True)
+    assert signals.says_farewell()
+    signals.end_without_farewell(os.getppid())
+    assert not signals.says_farewell()
+    signals.end_without_farewell(os.getpid())  # any process but the parent
+    assert signals.says_farewell()
+    signals.end_without_farewell(os.getppid())
+    monkeypatch.setattr(signals, "stopped", lambda: False)  # the node ends by itself
+    assert signals.says_farewell()
 
 
 def test_what_cant_be_imported_is_one_line(tmp_path: Path, environment: dict[str, str]) -> None:

@@ -47,7 +47,7 @@ from robot_formation.nodes.host.ros_parameters import (
     refuse_unused_overrides,
     take_changes,
 )
-from robot_formation.nodes.host.signals import bounded_end, ignore_signals, stopped
+from robot_formation.nodes.host.signals import bounded_end, ignore_signals, says_farewell, stopped
 from robot_formation.parameters import specs
 
 _IDLE_S = 0.03  # how often an idle node looks for signals
@@ -97,10 +97,11 @@ def run_node(name: str, make: Callable[[ParameterNode], Runnable]) -> int:
         print(f"{name}: {str(error).splitlines()[0]}", file=sys.stderr)
         return exit_codes.BAD_INPUT
     finally:
-        with bounded_end():
-            if node is not None:
-                node.destroy_node()
-            try_shutdown()
+        if says_farewell():
+            with bounded_end():
+                if node is not None:
+                    node.destroy_node()
+                try_shutdown()
         ignore_signals()
 
 

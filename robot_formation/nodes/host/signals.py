@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from robot_formation.system.signal_handling import ENDING, SignalCounter
 _LONGEST_END_S = 20
 """Longer than a launcher waits before it kills (15 s)."""
 _signals = SignalCounter()
+_launcher: int | None = None
 
 
 def stop_on_signals() -> None:
@@ -56,3 +58,22 @@ def bounded_end(longest_s: int = _LONGEST_END_S) -> Iterator[None]:
 def stopped() -> bool:
     """Return whether a signal has asked this process to end."""
     return _signals.came()
+
+
+def end_without_farewell(launcher: int) -> None:
+    """Let this process end without telling the graph, once it is asked to and if its launcher lives.
+
+    For a run of many nodes, which all end at once: each would tell all others of each of its publishers and
+    subscribers, and Fast DDS may deadlock meanwhile (its issue 6502). Nobody is left to hear it but programs that the
+    user has started, which list the nodes for 20 s more. The launcher removes what is left in shared memory.
+
+    Args:
+        launcher: its process id.
+    """
+    global _launcher
+    _launcher = launcher
+
+
+def says_farewell() -> bool:
+    """Return whether this process leaves the graph before it ends."""
+    return not (stopped() and _launcher == os.getppid())
