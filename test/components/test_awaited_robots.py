@@ -112,8 +112,10 @@ def test_a_period_awaits_everybody_but_who_is_late() -> None:
 
 def test_nothing_is_awaited_after_the_last_timestep() -> None:
     awaited = AwaitedRobots(Schedule.TIMER, ("leader",), 1, 1.0)
-    for _ in range(3):
+    for _ in range(2):
+        assert awaited.period_end_ns is not None
         awaited.period_ended()
+    assert awaited.period_end_ns is None  # time stands still once nobody moves
     awaited.ordered("leader")
     awaited.rests("leader")
     awaited.idle("leader")
