@@ -32,6 +32,7 @@ NODES = (
 # bench/kill_campaign.py.
 KILLED = ("/world", "/leader/drive", "/follower_1/fine_tuner", "/recorder")
 LONG = ("leader.timesteps=50",)
+SLOW = ("world.real_time_factor=10",)  # a node may be stopped for 6 s
 
 
 def shared_memory_ports(domain: int) -> list[str]:
@@ -69,7 +70,7 @@ def test_a_killed_node_ends_the_run_by_name_with_a_readable_bag(tmp_path: Path, 
 @pytest.mark.parametrize("node", ["/follower_1/predictor", "/recorder"])
 def test_a_stopped_node_ends_the_run_by_name_with_a_whole_bag(tmp_path: Path, node: str) -> None:
     killer = Killer(node, signal.SIGSTOP, after_timesteps=2)
-    result = launch(short_scenario(*LONG), tmp_path / "bag", say=killer.say, on_start=killer.started)
+    result = launch(short_scenario(*LONG, *SLOW), tmp_path / "bag", say=killer.say, on_start=killer.started)
     assert result.exit_code == 4
     assert f"node {node} was stopped" in result.reason
     assert not any(alive(pid) for pid in killer.pids.values())

@@ -20,7 +20,7 @@ from rclpy.exceptions import (
     InvalidParameterTypeException,
     InvalidParameterValueException,
 )
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
@@ -47,10 +47,11 @@ from robot_formation.nodes.host.ros_parameters import (
     refuse_unused_overrides,
     take_changes,
 )
-from robot_formation.nodes.host.signals import bounded_end, ignore_signals, says_farewell, stopped
+from robot_formation.nodes.host.signals import bounded_end, ignore_signals, says_farewell, stopped, woken_by_signals
 from robot_formation.parameters import specs
 
-_IDLE_S = 0.03  # how often an idle node looks for signals
+_IDLE_S = 1.0
+_LOOK_S = 0.03  # how often it looks for the nodes that it waits for
 _HELD_BACK_S = 0.01  # how often it looks for listeners while messages are held back
 _DIAGNOSTICS_S = 1.0
 _ACKNOWLEDGED_S = 2.0
@@ -187,23 +188,13 @@ class Host:
         self._await_nodes()
         executor = make_executor()
         executor.add_node(self._node)
-        component, outbox = self._component, self._outbox
+        component = self._component
         if not stopped():
             component.start()
             self._say(0, self._ready())
         try:
-            while not stopped() and (component.exit_code is None or outbox.waiting):
-                outbox.flush()
-                busy = component.busy and not outbox.waiting
-                idle_s = _HELD_BACK_S if outbox.waiting else _IDLE_S
-                with contextlib.suppress(ExternalShutdownException):
-                    executor.spin_once(min(self._pacer.left_s, idle_s) if busy else idle_s)
-                if self._failure is not None:
-                    raise self._failure
-                ready = component.busy and not outbox.waiting and component.exit_code is None
-                if ready and self._pacer.left_s <= 0.0:
-                    component.work()
-                    self._pacer.worked(component.stamp_ns)
+            with woken_by_signals(lambda: executor.create_task(_do_nothing)):
+                self._work_until_done(executor)
             if component.exit_code or component.held_code:
                 self._say(0, component.exit_reason or component.held_reason)
             elif component.exit_code is not None:
@@ -217,13 +208,28 @@ class Host:
             component.close()
         return component.exit_code or component.held_code
 
+    def _work_until_done(self, executor: Executor) -> None:
+        component, outbox = self._component, self._outbox
+        while not stopped() and (component.exit_code is None or outbox.waiting):
+            outbox.flush()
+            busy = component.busy and not outbox.waiting
+            idle_s = _HELD_BACK_S if outbox.waiting else _IDLE_S
+            with contextlib.suppress(ExternalShutdownException):
+                executor.spin_once(min(self._pacer.left_s, idle_s) if busy else idle_s)
+            if self._failure is not None:
+                raise self._failure
+            ready = component.busy and not outbox.waiting and component.exit_code is None
+            if ready and self._pacer.left_s <= 0.0:
+                component.work()
+                self._pacer.worked(component.stamp_ns)
+
     def _await_nodes(self) -> None:
         """Wait until the nodes without which this one may not begin are there; messages are kept meanwhile."""
         missing = self._awaited
         if missing:
             self._say(0, f"waiting for {', '.join(missing)}")
         while missing and not stopped():
-            time.sleep(_IDLE_S)
+            time.sleep(_LOOK_S)
             present = node_names(self._node)
             missing = [name for name in missing if name not in present]
         self._heard_s = time.monotonic()
@@ -281,6 +287,10 @@ class Host:
         name = self._node.get_fully_qualified_name()
         stamp_ns = self._component.stamp_ns
         self._health.publish(conversions.diagnostics(name, health.level, health.text, health.values, stamp_ns))
+
+
+def _do_nothing() -> None:
+    """Return; an executor that has done something comes back."""
 
 
 def _trigger(service: Callable[[], tuple[bool, str]], request: Message, response: Message) -> Message:

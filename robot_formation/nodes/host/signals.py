@@ -6,7 +6,8 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 
 from robot_formation import exit_codes
 from robot_formation.errors import FormationError
@@ -58,6 +59,32 @@ def bounded_end(longest_s: int = _LONGEST_END_S) -> Iterator[None]:
 def stopped() -> bool:
     """Return whether a signal has asked this process to end."""
     return _signals.came()
+
+
+@contextlib.contextmanager
+def woken_by_signals(wake: Callable[[], object]) -> Iterator[None]:
+    """Call `wake`, from a thread of its own, whenever a signal comes while what is inside runs.
+
+    A signal doesn't end a wait in ROS's code, and Python's handler runs only after that wait. Looking for signals every
+    30 ms instead costs a hundredth of a processor per node.
+    """
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    before = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    thread = threading.Thread(target=_wake_for_each, args=(reading, wake))
+    thread.start()
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(writing)
+        thread.join()
+        os.close(reading)
+
+
+def _wake_for_each(reading: int, wake: Callable[[], object]) -> None:
+    while os.read(reading, 1):
+        wake()
 
 
 def end_without_farewell(launcher: int) -> None:
