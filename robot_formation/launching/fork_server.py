@@ -35,7 +35,7 @@ _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _PR_GET_CHILD_SUBREAPER = 37
 _ADOPTION_S = 5.0
-_END_S = 2.0
+_END_S = 5.0
 _POLL_S = 0.1
 _COMMON = ("robot_formation.nodes.executables", "robot_formation.nodes.host.component_node")
 """Modules that all nodes need; what only some need is imported before the first of these is forked."""
@@ -87,8 +87,17 @@ class ForkServer:
         except subprocess.TimeoutExpired:  # it was stopped, or hangs in an import
             self._process.kill()
             self._process.wait()
+        self._end_unclaimed()
         self._answers.close()
         self._stack.close()
+
+    def _end_unclaimed(self) -> None:
+        """Kill a node that was forked when nobody waited for it any more."""
+        while select.select([self._answers], [], [], 0.0)[0] and (answer := self._answers.readline()):
+            pid = int(answer)
+            with contextlib.suppress(ProcessLookupError, ChildProcessError):
+                os.kill(pid, signal.SIGKILL)
+                os.waitpid(pid, 0)
 
     def start(
         self, executable: str, arguments: Sequence[str], log: Path, give_up: Callable[[], bool] = lambda: False

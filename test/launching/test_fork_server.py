@@ -1,5 +1,6 @@
 """Nodes that one process forks are the launcher's own children, each with a name, a log and an end of its own."""
 
+import contextlib
 import os
 import signal
 import sys
@@ -37,6 +38,13 @@ def touched(log: Path) -> Path:
 def ended(pid: int) -> int:
     """The exit code of a child, negative for a signal; only a process's own children can be waited for."""
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+def parent_of(stat: Path) -> int:
+    """The parent of a process, by /proc/PID/stat; 0 if it is gone."""
+    with contextlib.suppress(OSError):
+        return int(stat.read_text().rpartition(")")[2].split()[1])
+    return 0
 
 
 def test_a_node_ends_with_its_own_code_and_its_words_are_in_its_own_log(
@@ -118,6 +126,24 @@ def test_a_killed_server_is_named_and_a_stopped_one_is_not_waited_for_after_an_i
         with pytest.raises(NodeNotStartedError, match="interrupted"):
             server.start("drive", RIGHT, tmp_path / "node", give_up=lambda: True)
     assert server._process.returncode == -signal.SIGKILL
+
+
+def test_a_node_that_is_forked_when_nobody_waits_for_it_any_more_is_ended(
+    tmp_path: Path, environment: dict[str, str]
+) -> None:
+    (tmp_path / "node").touch()
+    with ForkServer(environment, tmp_path / "server.log") as server:
+        server._process.send_signal(signal.SIGSTOP)
+        with pytest.raises(NodeNotStartedError, match="interrupted"):
+            server.start("drive", RIGHT, tmp_path / "node", give_up=lambda: True)
+        server._process.send_signal(signal.SIGCONT)
+    assert server._process.returncode == 0
+    titles = [
+        (entry.parent / "cmdline").read_bytes()
+        for entry in Path("/proc").glob("[0-9]*/stat")
+        if parent_of(entry) == os.getpid()
+    ]
+    assert not any(title.startswith(b"robot_formation drive") for title in titles)
 
 
 def test_a_run_whose_nodes_cannot_be_forked_ends_as_one_whose_node_died(
