@@ -148,7 +148,9 @@ class AwaitedRobots:
 
     @property
     def period_end_ns(self) -> int | None:
-        """Simulated time up to which time goes on by itself; None after the last timestep, and in other schedules."""
+        """Simulated time up to which time goes on by itself; None after the last timestep's period, and in
+        other schedules.
+        """
         if self._schedule is not Schedule.TIMER or self._period > self._timesteps:
             return None
         return round(1e9 * begin_s(self._period + 1, self._period_s))

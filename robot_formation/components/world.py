@@ -175,12 +175,18 @@ class WorldComponent(Component):
     @property
     def busy(self) -> bool:
         """See `Component`."""
-        return self._world.owes and not self._paused and not self._waits
+        return self._world.owes and not self._paused and not self._waits and not self._over
 
     @property
     def _waits(self) -> bool:
         """Whether time stands still although it is owed: somebody has to order something or to say that it is done."""
         return self._awaited.any or self._leader_between
+
+    @property
+    def _over(self) -> bool:
+        """Whether the leader now ends the run by the clock: a robot that is late doesn't finish its timestep."""
+        by_clock = self._parameters.schedule is Schedule.TIMER and self._awaited.period_end_ns is None
+        return by_clock and self._leader_moves >= self._parameters.timesteps
 
     def work(self) -> None:
         """See `Component`: advances to the next instant that has something to publish."""

@@ -232,3 +232,12 @@ def test_lines_fit_their_plates(name: str, followers: int) -> None:
     found = load(presets()[name])
     found.check()
     assert found.setup.followers == followers
+
+
+def test_time_stands_still_for_late_robots_too_when_the_leader_ends_the_run_by_the_clock() -> None:
+    """Over the graph the world would go on with their moves, for as long as the leader's node takes to end."""
+    late = ["leader.step_m=0.2", "leader.period_s=2.0", "leader.timesteps=3", "drive.wheel_speed_rad_s=1.5"]
+    run = InProcessRun(override(load_track("two"), ["schedule=timer", "world.camera.mode=on_demand", *late]))
+    assert run.run() == (0, "")
+    assert run._world._world.owes
+    assert not run._world.busy
