@@ -39,7 +39,7 @@ def node_environment(domain: int, folder: Path, nodes: int = 1) -> dict[str, str
     environment.setdefault("AMENT_PREFIX_PATH", sys.prefix)
     use_loopback(environment)
     if nodes >= MANY_NODES:
-        use_profile_for_many(environment, folder)
+        use_profile_for_many(environment, folder, nodes)
     # Many small processes on few cores: a pool of threads for linear algebra in each would only get in the way.
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         environment.setdefault(name, "1")

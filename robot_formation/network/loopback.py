@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import MutableMapping
 from pathlib import Path
 
 from robot_formation.errors import FormationError
+from robot_formation.network.shared_memory_space import SHARED_MEMORY
 from robot_formation.paths import config_dir
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
@@ -55,31 +57,41 @@ def use_loopback(environment: MutableMapping[str, str]) -> None:
         environment.update({**dict.fromkeys(PROFILES, str(profile)), RANGE: "SYSTEM_DEFAULT"})
 
 
-def use_profile_for_many(environment: MutableMapping[str, str], folder: Path) -> None:
+def use_profile_for_many(environment: MutableMapping[str, str], folder: Path, nodes: int) -> None:
     """Change a process's environment so that many nodes that start at once find each other with fewer packets.
 
     The profile is a copy of config/loopback.xml, written into `folder`. Segments of shared memory are larger, since
-    their size limits what `sendBufferSize` there is for; they take memory, so a small graph does without. And nodes
-    announce themselves fewer times, but for as long as 45 nodes need to start on two cores. Nothing is changed where
-    that file is not in use. Time until the first timestep of ten followers: bench/chain_graph.py.
+    Fast DDS takes the smaller of segment and send buffer for `sendBufferSize`; they take memory, so a small graph does
+    without, as does one for which /dev/shm is too small (64 MB in a container by default). And nodes announce
+    themselves fewer times, but for as long as 45 nodes need to start on two cores. Nothing is changed where that file
+    is not in use. Time until the first timestep of ten followers: bench/chain_graph.py.
     """
     profile = environment.get(PROFILES[0], "")
-    if profile != str(config_dir() / "loopback.xml"):
+    if not profile or profile != str(config_dir() / "loopback.xml"):
         return
     from xml.etree import ElementTree  # every node imports this module, and few runs come here
 
     ElementTree.register_namespace("", _XML)  # Fast DDS knows no prefixes
     tree = ElementTree.parse(profile)
-    (shared_memory,) = (
-        transport for transport in tree.iter(_tag("transport_descriptor")) if transport.findtext(_tag("type")) == "SHM"
-    )
-    ElementTree.SubElement(shared_memory, _tag("segment_size")).text = str(_SEGMENT_BYTES)
+    if _free_bytes(SHARED_MEMORY) > 2 * nodes * _SEGMENT_BYTES:
+        transports = tree.iter(_tag("transport_descriptor"))
+        (shared_memory,) = (transport for transport in transports if transport.findtext(_tag("type")) == "SHM")
+        ElementTree.SubElement(shared_memory, _tag("segment_size")).text = str(_SEGMENT_BYTES)
     (announcements,) = tree.iter(_tag("initialAnnouncements"))
     (count,), (period,) = announcements.iter(_tag("count")), announcements.iter(_tag("nanosec"))
     count.text, period.text = str(_ANNOUNCEMENTS), str(_ANNOUNCEMENT_PERIOD_NS)
     changed = folder / "loopback_many.xml"
     tree.write(changed, encoding="UTF-8", xml_declaration=True)
     environment.update(dict.fromkeys(PROFILES, str(changed)))
+
+
+def _free_bytes(folder: Path) -> int:
+    """Return how much a folder's file system has room for; 0 if there is none."""
+    try:
+        found = os.statvfs(folder)
+    except OSError:
+        return 0
+    return found.f_bavail * found.f_frsize
 
 
 def _tag(name: str) -> str:

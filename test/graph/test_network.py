@@ -10,8 +10,16 @@ import pytest
 
 from graph_lab import DEADLINE_S, Lab
 from robot_formation import names
+from robot_formation.launching.environment import node_environment
 from robot_formation.network import loopback
-from robot_formation.network.loopback import PROFILES, RANGE, stay_here, use_loopback, use_profile_for_many
+from robot_formation.network.loopback import (
+    MANY_NODES,
+    PROFILES,
+    RANGE,
+    stay_here,
+    use_loopback,
+    use_profile_for_many,
+)
 from robot_formation.paths import config_dir
 
 PROFILE = str(config_dir() / "loopback.xml")
@@ -91,17 +99,21 @@ print("found", flush=True)
 def test_fourteen_participants_of_one_domain_find_each_other(lab: Lab, tmp_path: Path, many: bool) -> None:
     environment = dict(lab.environment)
     if many:
-        use_profile_for_many(environment, tmp_path)
+        use_profile_for_many(environment, tmp_path, MANY_NODES)
         assert environment[PROFILES[0]] == str(tmp_path / "loopback_many.xml")
     process = lab.open([sys.executable, "-c", MANY], environment)
     out, error = process.communicate(timeout=DEADLINE_S)
     assert out.endswith("found\n"), error
-    assert "XMLPARSER" not in error
+    assert "XMLPARSER" not in out + error
 
 
-def test_the_profile_for_many_nodes_differs_in_three_values_only(tmp_path: Path) -> None:
+@pytest.mark.parametrize("room", [False, True], ids=["small /dev/shm", "room in /dev/shm"])
+def test_the_profile_for_many_nodes_differs_in_three_values_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: bool
+) -> None:
+    monkeypatch.setattr(loopback, "_free_bytes", lambda folder: 2**30 if room else 64 * 2**20)
     environment = {RANGE: "SYSTEM_DEFAULT", **dict.fromkeys(PROFILES, PROFILE)}
-    use_profile_for_many(environment, tmp_path)
+    use_profile_for_many(environment, tmp_path, 45)
     changed = tmp_path / "loopback_many.xml"
     assert environment == {RANGE: "SYSTEM_DEFAULT", **dict.fromkeys(PROFILES, str(changed))}
     before, after = (
@@ -110,16 +122,30 @@ def test_the_profile_for_many_nodes_differs_in_three_values_only(tmp_path: Path)
     )
     tag = "{http://www.eprosima.com}"
     assert [entry for entry in before if entry not in after] == [(f"{tag}count", "20"), (f"{tag}nanosec", "100000000")]
-    added = [(f"{tag}segment_size", "2097152"), (f"{tag}count", "8"), (f"{tag}nanosec", "300000000")]
+    added = [(f"{tag}segment_size", "2097152")] * room + [(f"{tag}count", "8"), (f"{tag}nanosec", "300000000")]
     assert [entry for entry in after if entry not in before] == added
+    assert not changed.read_text().count("ns0:")
+    transports = ElementTree.parse(changed).iter(f"{tag}transport_descriptor")
+    sizes = {found.findtext(f"{tag}type"): found.findtext(f"{tag}segment_size") for found in transports}
+    assert sizes == {"UDPv4": None, "SHM": "2097152" if room else None}
 
 
 @pytest.mark.parametrize("own", [{}, dict.fromkeys(PROFILES, "/home/somebody/mine.xml")])
 def test_a_profile_of_the_users_own_stays_for_many_nodes_too(own: dict[str, str], tmp_path: Path) -> None:
     environment = dict(own)
-    use_profile_for_many(environment, tmp_path)
+    use_profile_for_many(environment, tmp_path, MANY_NODES)
     assert environment == own
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("nodes", "expected"), [(MANY_NODES - 1, PROFILE), (MANY_NODES, "loopback_many.xml")])
+def test_a_run_of_many_nodes_gets_that_profile(
+    nodes: int, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in PROFILES:
+        monkeypatch.delenv(name, raising=False)
+    profile = node_environment(7, tmp_path, nodes)[PROFILES[0]]
+    assert profile in (expected, str(tmp_path / expected))
 
 
 @pytest.mark.parametrize("middleware", [{}, {"RMW_IMPLEMENTATION": "rmw_fastrtps_dynamic_cpp"}])
