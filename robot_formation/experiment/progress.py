@@ -159,7 +159,7 @@ class Progress:
         return list(self._handlers)
 
     @property
-    def begun(self) -> bool:
+    def timestep_finished(self) -> bool:
         """Whether a follower has finished a timestep."""
         return any(len(self._heard[robot].timesteps) for robot in self._followers)
 

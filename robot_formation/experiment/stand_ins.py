@@ -134,7 +134,7 @@ class StandIns:
         if gone:
             return f"node {gone[0]}, started elsewhere, is gone"
         if self._missing and self._run_began is not None and self._looked_at - self._run_began > _UNSEEN_S:
-            return f"node {self._missing[0]}, started elsewhere, has not been seen since the run began"
+            return f"node {self._missing[0]}, started elsewhere, was never seen, although the run has begun"
         if self._missing and self._looked_at - self._began > self._timeout_s:
             return f"no node {' and no node '.join(self._missing)} appeared within {self._timeout_s:g} s"
         return ""

@@ -54,7 +54,7 @@ class ForkServer:
     Args:
         environment: of the server and so of all nodes; an attribute too.
         log: file for what the server itself prints: errors.
-        farewell: whether nodes that are asked to end tell the graph, as `nodes.host.signals` says.
+        farewell: whether nodes leave the graph before they end, as `nodes.host.signals` says.
     """
 
     def __init__(self, environment: Mapping[str, str], log: Path, *, farewell: bool = True) -> None:
@@ -114,8 +114,12 @@ class ForkServer:
             RunError: if something can't be imported.
             NodeNotStartedError: if the server died or doesn't answer, or `give_up` said so.
         """
-        words = {"executable": executable, "arguments": list(arguments), "log": str(log)}
-        request = {**words, "farewell": self._farewell}
+        request = {
+            "executable": executable,
+            "arguments": list(arguments),
+            "log": str(log),
+            "farewell": self._farewell,
+        }
         with contextlib.suppress(BrokenPipeError):
             self._requests.write(json.dumps(request).encode() + b"\n")
             self._requests.flush()
@@ -188,7 +192,7 @@ def serve(requests: BinaryIO, answers: BinaryIO, launcher: int) -> int:
                 os._exit(0)
             requests.close()
             answers.close()
-            return _node(request["executable"], request["arguments"], request["log"], launcher, request["farewell"])
+            return _node(launcher=launcher, **request)
         if os.waitpid(middle, 0)[1]:
             return exit_codes.NODE_DIED
     return exit_codes.DONE
@@ -213,7 +217,7 @@ def _forked_or_gone() -> int:
         os._exit(exit_codes.NODE_DIED)
 
 
-def _node(executable: str, arguments: list[str], log: str, launcher: int, farewell: bool) -> int:
+def _node(*, executable: str, arguments: list[str], log: str, farewell: bool, launcher: int) -> int:
     """Be a node from here on; return its exit code."""
     os.setsid()
     nothing, output = os.open(os.devnull, os.O_RDONLY), os.open(log, os.O_WRONLY | os.O_APPEND)

@@ -113,7 +113,7 @@ class Launcher:
             result = RunResult(exit_codes.NODE_DIED, self.bag)
             began = time.monotonic()
             try:
-                environment = node_environment(domain, folder, len(list(self.scenario.hosts())))
+                environment = node_environment(domain, folder, self._nodes)
                 if self.scenario.leader.path == Teleop.name:
                     self._tell(_how_to_drive(domain))
                 result.exit_code, result.reason = self._drive(folder, environment, result)
@@ -148,8 +148,8 @@ class Launcher:
         with contextlib.ExitStack() as stack:
             try:
                 # Two processes import ROS at the same time: that of the nodes, and this one.
-                many = len(table) >= MANY_NODES
-                with ForkServer(environment, folder / "fork_server.log", farewell=not many) as server:
+                log, few = folder / "fork_server.log", self._nodes < MANY_NODES
+                with ForkServer(environment, log, farewell=few) as server:
                     from robot_formation.nodes.progress.monitor import Monitor  # needs the environment of the wheels
 
                     # The monitor joins first: the nodes then know of it before they send anything.
@@ -202,6 +202,11 @@ class Launcher:
         return Progress(self.scenario.slots, self.scenario.leader.timesteps, self._tell, elapsed, delayed=delayed)
 
     @property
+    def _nodes(self) -> int:
+        """How many nodes the run has, stand-ins included, without the recorder and viewers."""
+        return len(list(self.scenario.hosts()))
+
+    @property
     def _needed(self) -> list[Child]:
         """The nodes without which the run can't go on."""
         return [child for child in self._children if child.process.executable not in ONLOOKERS]
@@ -247,7 +252,7 @@ class Launcher:
 
     def _look(self, stand_ins: StandIns, watchdog: Watchdog, monitor: Monitor, progress: Progress) -> str:
         """Return why the run can't go on, if it is time to look for that; the nodes stand while some are missing."""
-        if stand_ins.due and (reason := stand_ins.look(monitor.nodes(), begun=progress.begun)):
+        if stand_ins.due and (reason := stand_ins.look(monitor.nodes(), begun=progress.timestep_finished)):
             return reason
         if stand_ins.awaited or not watchdog.due:
             return ""

@@ -104,7 +104,7 @@ def test_one_that_is_not_seen_although_the_run_has_begun_is_told_after_as_long_a
     assert watched.look(one, after_s=100.0) == ""
     assert watched.look(one, begun=True) == ""
     assert watched.look(one, begun=True, after_s=20.0) == ""
-    missing = f"node {other}, started elsewhere, has not been seen since the run began"
+    missing = f"node {other}, started elsewhere, was never seen, although the run has begun"
     assert watched.look(one, begun=True, after_s=0.1) == missing
     watched = Watched(timeout_s=300.0)
     watched.look(one, begun=True)

@@ -32,7 +32,8 @@ NODES = (
 # bench/kill_campaign.py.
 KILLED = ("/world", "/leader/drive", "/follower_1/fine_tuner", "/recorder")
 LONG = ("leader.timesteps=50",)
-SLOW = ("world.real_time_factor=10",)  # a node may be stopped for 6 s
+SLOW = ("world.real_time_factor=10",)
+"""The run has to last longer than the 6 s for which a node may be stopped."""
 
 
 def shared_memory_ports(domain: int) -> list[str]:

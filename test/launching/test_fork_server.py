@@ -92,14 +92,10 @@ def test_a_node_without_farewell_leaves_its_shared_memory_to_the_launcher(
 
 def test_a_node_whose_launcher_is_gone_says_farewell(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(signals, "_launcher", None)
-    monkeypatch.setattr(signals, "stopped", lambda: True)
     assert signals.says_farewell()
     signals.end_without_farewell(os.getppid())
     assert not signals.says_farewell()
     signals.end_without_farewell(os.getpid())  # any process but the parent
-    assert signals.says_farewell()
-    signals.end_without_farewell(os.getppid())
-    monkeypatch.setattr(signals, "stopped", lambda: False)  # the node ends by itself
     assert signals.says_farewell()
 
 

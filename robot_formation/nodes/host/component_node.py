@@ -50,11 +50,13 @@ from robot_formation.nodes.host.ros_parameters import (
 from robot_formation.nodes.host.signals import bounded_end, ignore_signals, says_farewell, stopped, woken_by_signals
 from robot_formation.parameters import specs
 
-_IDLE_S = 1.0
-_LOOK_S = 0.03  # how often it looks for the nodes that it waits for
+_IDLE_S = 1.0  # how long a node waits for a message at most; signals end the wait
+_LOOK_S = 0.03  # how often a node looks for those that it waits for
 _HELD_BACK_S = 0.01  # how often it looks for listeners while messages are held back
 _DIAGNOSTICS_S = 1.0
-_ACKNOWLEDGED_S = 2.0
+_ACKNOWLEDGED_S, _ACKNOWLEDGED_BY_MANY_S = 2.0, 0.5
+"""How long a node makes sure at its end that its messages have arrived. Where all end without leaving the graph, those
+that have ended already never acknowledge."""
 _BAD_INPUT = (FormationError, InvalidParameterException, InvalidParameterTypeException, InvalidParameterValueException)
 
 
@@ -201,7 +203,8 @@ class Host:
                 self._say(0, component.exit_reason)
             self._publish_health()
         finally:
-            end = time.monotonic() + _ACKNOWLEDGED_S  # a listener that was killed never acknowledges
+            # A listener that was killed never acknowledges.
+            end = time.monotonic() + (_ACKNOWLEDGED_S if says_farewell() else _ACKNOWLEDGED_BY_MANY_S)
             for publisher in (*self._publishers.values(), self._health):
                 publisher.wait_for_all_acked(Duration(seconds=max(0.0, end - time.monotonic())))
             executor.shutdown()
@@ -290,7 +293,7 @@ class Host:
 
 
 def _do_nothing() -> None:
-    """Return; an executor that has done something comes back."""
+    """Do nothing: `spin_once` returns after any task."""
 
 
 def _trigger(service: Callable[[], tuple[bool, str]], request: Message, response: Message) -> Message:

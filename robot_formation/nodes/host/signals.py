@@ -88,11 +88,12 @@ def _wake_for_each(reading: int, wake: Callable[[], object]) -> None:
 
 
 def end_without_farewell(launcher: int) -> None:
-    """Let this process end without telling the graph, once it is asked to and if its launcher lives.
+    """Let this process end without leaving the graph first, as long as its launcher lives.
 
-    For a run of many nodes, which all end at once: each would tell all others of each of its publishers and
-    subscribers, and Fast DDS may deadlock meanwhile (its issue 6502). Nobody is left to hear it but programs that the
-    user has started, which list the nodes for 20 s more. The launcher removes what is left in shared memory.
+    For a run of many nodes, which ends with the first of them: each would tell all others of the end of each of its
+    publishers and subscribers, and Fast DDS may deadlock meanwhile (its issue 6502). Nobody is left to hear it but
+    programs that the user has started, which list the nodes for 20 s more. The launcher removes what is left in shared
+    memory.
 
     Args:
         launcher: its process id.
@@ -103,4 +104,4 @@ def end_without_farewell(launcher: int) -> None:
 
 def says_farewell() -> bool:
     """Return whether this process leaves the graph before it ends."""
-    return not (stopped() and _launcher == os.getppid())
+    return _launcher != os.getppid()

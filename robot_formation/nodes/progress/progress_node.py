@@ -82,7 +82,7 @@ class ProgressExecutable:
         return exit_codes.DONE
 
     def _look(self) -> str:
-        return self._stand_ins.look(node_names(self._node), begun=self._progress.begun)
+        return self._stand_ins.look(node_names(self._node), begun=self._progress.timestep_finished)
 
     def _drain(self, executor: Executor) -> None:
         """Process what is still on its way: the last timestep's messages, mostly."""
