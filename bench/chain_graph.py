@@ -82,7 +82,7 @@ def main() -> None:
             start, timestep, end = (statistics.median(values) for values in zip(*runs, strict=True))
             first = first or (followers, timestep)
             ratio = timestep / first[1]
-            row = (schedule, followers, f"{start:.1f}", f"{timestep:.2f}", f"{end:.1f}", f"{ratio:.1f}")
+            row = (schedule, followers, f"{start:.1f}", f"{timestep:.3f}", f"{end:.1f}", f"{ratio:.1f}")
             print("|", " | ".join(map(str, row)), f"| {ratio * first[0] / followers:.2f} |", flush=True)
 
 

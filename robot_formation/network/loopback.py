@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import shutil
 from collections.abc import MutableMapping
 from pathlib import Path
 
@@ -73,7 +73,7 @@ def use_profile_for_many(environment: MutableMapping[str, str], folder: Path, no
 
     ElementTree.register_namespace("", _XML)  # Fast DDS knows no prefixes
     tree = ElementTree.parse(profile)
-    if _free_bytes(SHARED_MEMORY) > 2 * nodes * _SEGMENT_BYTES:
+    if SHARED_MEMORY.is_dir() and shutil.disk_usage(SHARED_MEMORY).free > 2 * nodes * _SEGMENT_BYTES:
         transports = tree.iter(_tag("transport_descriptor"))
         (shared_memory,) = (transport for transport in transports if transport.findtext(_tag("type")) == "SHM")
         ElementTree.SubElement(shared_memory, _tag("segment_size")).text = str(_SEGMENT_BYTES)
@@ -83,15 +83,6 @@ def use_profile_for_many(environment: MutableMapping[str, str], folder: Path, no
     changed = folder / "loopback_many.xml"
     tree.write(changed, encoding="UTF-8", xml_declaration=True)
     environment.update(dict.fromkeys(PROFILES, str(changed)))
-
-
-def _free_bytes(folder: Path) -> int:
-    """Return how much a folder's file system has room for; 0 if there is none."""
-    try:
-        found = os.statvfs(folder)
-    except OSError:
-        return 0
-    return found.f_bavail * found.f_frsize
 
 
 def _tag(name: str) -> str:

@@ -1,9 +1,11 @@
 """Which sockets the nodes open, and who finds them."""
 
 import os
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import pytest
@@ -111,7 +113,8 @@ def test_fourteen_participants_of_one_domain_find_each_other(lab: Lab, tmp_path:
 def test_the_profile_for_many_nodes_differs_in_three_values_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, room: bool
 ) -> None:
-    monkeypatch.setattr(loopback, "_free_bytes", lambda folder: 2**30 if room else 64 * 2**20)
+    free = SimpleNamespace(free=2**30 if room else 64 * 2**20)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: free)
     environment = {RANGE: "SYSTEM_DEFAULT", **dict.fromkeys(PROFILES, PROFILE)}
     use_profile_for_many(environment, tmp_path, 45)
     changed = tmp_path / "loopback_many.xml"
