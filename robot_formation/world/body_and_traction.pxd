@@ -16,7 +16,7 @@ cdef class Body:
     cdef public tuple wheels
     cdef public list encoder_angles, encoder_speeds
     cdef Paraboloid _paraboloid
-    cdef object _surface, _client, _mass_offset, _law
+    cdef object _surface, _client, _mass_offset, _law, _pose
     cdef double _dt, _weight
     cdef tuple _v_wheel, _u_wheel
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from robot_formation.geometry.orientation import Quaternion, Vector, rotate
+from robot_formation.geometry.orientation import Vector, rotate
 from robot_formation.surface import Surface
 from robot_formation.surface.paraboloid import Paraboloid
 from robot_formation.world.bullet import pybullet
@@ -102,6 +102,7 @@ class Body:
         self.encoder_angles = [0.0, 0.0]
         self.encoder_speeds = [0.0, 0.0]
         self.index = self._make_body()
+        self._pose: Pose | None = None  # as long as it is known
 
     def _make_wheels(self, radius_scales: Sequence[float], gains: Sequence[float]) -> tuple[Wheel, ...]:
         p = self.parameters
@@ -157,6 +158,7 @@ class Body:
         pybullet.resetBasePositionAndOrientation(
             self.index, (x + ox, y + oy, z + oz), pose.orientation, physicsClientId=self._client
         )
+        self._pose = None
         self.freeze()
 
     def shift(self, pose: Pose) -> None:
@@ -176,16 +178,17 @@ class Body:
         (vx, vy, vz), (wx, wy, wz) = _read_velocity(self.index, self._client)
         return vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz
 
-    def placement(self) -> tuple[Vector, Quaternion]:
-        """Place and orientation of the centre of mass: they tell at the least cost whether the body has moved."""
-        found: tuple[Vector, Quaternion] = _read_pose(self.index, self._client)
-        return found
-
     def pose(self) -> Pose:
-        """Pose of base_link."""
-        (x, y, z), orientation = self.placement()
-        ox, oy, oz = rotate(orientation, self._mass_offset)
-        return Pose((x - ox, y - oy, z - oz), orientation)
+        """Pose of base_link: the same object as long as the body has not moved."""
+        if self._pose is None:
+            (x, y, z), orientation = _read_pose(self.index, self._client)
+            ox, oy, oz = rotate(orientation, self._mass_offset)
+            self._pose = Pose((x - ox, y - oy, z - oz), orientation)
+        return self._pose
+
+    def forget_pose(self) -> None:
+        """Read the pose anew when it is asked for next: another body may have moved this one."""
+        self._pose = None
 
     def state(self) -> BodyState:
         """Pose of base_link and its velocity."""
@@ -201,6 +204,7 @@ class Body:
         One long function on purpose: it is the simulation's hot loop, in plain scalars and local names.
         """
         client, body, dt = self._client, self.index, self._dt
+        self._pose = None
         # All fields of the law in their order: ten reads by name would take twice as long.
         stiffness, damping, grip, drag, sigma0, sigma1, relaxation, contact_radius, soft, travel = self._law
         # The last step's twist: it changes with the distance driven only.

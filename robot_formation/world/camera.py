@@ -70,14 +70,18 @@ class Camera:
         return self._occlusion.seen(others, *self.optical_frame(robot))
 
     def light(self, robot: Pose, others: Sequence[Pose]) -> Light:
-        """Light on the sensor, uint16 (rows, columns, 3) red, green, blue, of a robot that sees robots at `others`.
+        """Light on the sensor, uint16 (rows, columns, 3) red, green, blue, of a robot among robots at `others`.
 
         Poses are base_link poses; no physics is involved. The lamp is white and has no strength here.
         """
+        return self.light_of(robot, self.may_see(robot, others))
+
+    def light_of(self, robot: Pose, seen: Sequence[Pose]) -> Light:
+        """Light on the sensor of a robot that sees the robots that `may_see` has listed, far to near."""
         p = self.parameters
         rotation, lens = self.optical_frame(robot)
         faces = self._plate(rotation, lens)
-        for other in self._occlusion.seen(others, rotation, lens):
+        for other in seen:
             faces += self._robot(self._scene.robot_faces(other, lens), rotation, lens)
         first = self._first_row(faces)
         canvas = self._canvas[SUPERSAMPLING * first :]

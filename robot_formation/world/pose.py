@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -46,15 +47,22 @@ class Pose:
         return (self.position[0] + x, self.position[1] + y, self.position[2] + z)
 
     def matrix(self) -> NDArray[np.float64]:
-        """Rotation matrix (3, 3): columns are the frame's axes in the world."""
+        """Rotation matrix (3, 3), read-only: columns are the frame's axes in the world."""
+        return self._matrix
+
+    @functools.cached_property
+    def _matrix(self) -> NDArray[np.float64]:
+        # A chain's cameras ask again and again for the poses of the same standing robots.
         x, y, z, w = self.orientation
-        return np.array(
+        matrix = np.array(
             [
                 [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
                 [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
             ]
         )
+        matrix.setflags(write=False)
+        return matrix
 
 
 def off_plate(surface: Surface, robot: Pose, dot_height_m: float) -> tuple[float, float] | None:

@@ -6,7 +6,6 @@ import weakref
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from robot_formation.geometry.orientation import Quaternion, Vector
 from robot_formation.parameters import suggestion
 from robot_formation.surface import Surface
 from robot_formation.world.bullet import pybullet
@@ -21,19 +20,20 @@ from robot_formation.world.sensor import Development, Sensor
 from robot_formation.world.start import RobotStart
 
 MAX_FRAMES_OWED = 600
+_read_contacts = pybullet.getContactPoints
 
 
 class _Picture(NamedTuple):
     """A robot's last picture before noise, for as long as nothing in view moves.
 
     Attributes:
-        placements: of all robots, by which it is told at once that nothing has moved.
-        poses: of the robot itself, then of those that it may see.
+        everyone: poses of all robots, by which it is told at once that nothing has moved.
+        seen: of the robot itself, then of those that it may see.
         development: the picture.
     """
 
-    placements: list[tuple[Vector, Quaternion]]
-    poses: list[Pose]
+    everyone: list[Pose]
+    seen: list[Pose]
     development: Development
 
 
@@ -232,9 +232,11 @@ class World:
             return False
         pybullet.stepSimulation(self._client)
         self.step_count += 1
-        for robot in sleepers:
-            if robot.pushed():
-                robot.disturb()
+        # Nothing but another body moves a sleeper. Asking for contacts costs as much as one robot's velocity.
+        if sleepers and _read_contacts(physicsClientId=self._client):
+            for robot in sleepers:
+                if robot.pushed():
+                    robot.disturb()
         return True
 
     def _motion_events(self) -> list[Event]:
@@ -272,17 +274,17 @@ class World:
 
     def _take_picture(self, name: str) -> RenderedPicture:
         sensor = self._sensors[name]
-        placements = [robot.body.placement() for robot in self._robots.values()]
+        everyone = [robot.body.pose() for robot in self._robots.values()]
         kept = self._pictures.get(name)
-        if kept is None or kept.placements != placements:
+        if kept is None or kept.everyone != everyone:
             own = self._robots[name].body.pose()
-            others = [robot.body.pose() for other, robot in self._robots.items() if other != name]
-            poses = [own, *self._camera.may_see(own, others)]
-            if kept is None or kept.poses != poses:
-                development = sensor.develop(self._camera.light(own, poses[1:]))
+            others = [pose for other, pose in zip(self._robots, everyone, strict=True) if other != name]
+            seen = [own, *self._camera.may_see(own, others)]
+            if kept is None or kept.seen != seen:
+                development = sensor.develop(self._camera.light_of(own, seen[1:]))
             else:
                 development = kept.development
-            kept = self._pictures[name] = _Picture(placements, poses, development)
+            kept = self._pictures[name] = _Picture(everyone, seen, development)
         return sensor.expose(kept.development, self.step_count / self.parameters.physics_hz)
 
     def _owes(self) -> bool:
