@@ -1,18 +1,25 @@
-"""Message definitions and type hashes of ROS 2 Jazzy, from rosbags' type store: no ROS installation is needed."""
+"""Message definitions and type hashes of ROS 2 Jazzy, as rosbags' type store has them: no ROS installation is needed.
+
+Those of the project's own topics are kept in a file, since loading rosbags and its store takes 0.1 s, a twelfth of a
+short run: `python bench/make_message_definitions.py` writes it.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
 from robot_formation.bag.errors import BagError
 
+DEFINITIONS_FILE = Path(__file__).with_name("message_definitions.json")
+"""By type name: text and hash."""
+ENCODING = "ros2msg"
 _TYPE_NAME = re.compile(r"\w+/msg/\w+")
+_TIMES = ("std_msgs/Header", "builtin_interfaces/Time")
 
 
 class Definition(NamedTuple):
@@ -23,10 +30,20 @@ class Definition(NamedTuple):
     text: str
     type_hash: str
 
+    @property
+    def begins_with_time(self) -> bool:
+        """Whether the first thing in a message is a time: its own, or that of its header."""
+        fields = (line.split() for line in self.text.partition("=" * 80)[0].splitlines())
+        # A constant has "=" in its line.
+        first = next((words for words in fields if words and not any("=" in word for word in words)), None)
+        return first is not None and first[0] in _TIMES
+
 
 @cache
 def jazzy_typestore() -> Any:
-    """Return rosbags' type store of ROS 2 Jazzy (made once: it takes about 60 ms)."""
+    """Return rosbags' type store of ROS 2 Jazzy, loaded when it is first asked for."""
+    from rosbags.typesys import Stores, get_typestore
+
     return get_typestore(Stores.ROS2_JAZZY)
 
 
@@ -39,6 +56,19 @@ def definition(type_name: str) -> Definition:
     Raises:
         BagError: neither has such a message type.
     """
+    if type_name in (kept := _kept_definitions()):
+        return Definition(type_name, ENCODING, *kept[type_name])
+    return looked_up(type_name)
+
+
+@cache
+def _kept_definitions() -> dict[str, tuple[str, str]]:
+    kept: dict[str, tuple[str, str]] = json.loads(DEFINITIONS_FILE.read_text(encoding="utf-8"))
+    return kept
+
+
+def looked_up(type_name: str) -> Definition:
+    """Look a message type up as `definition` does, without the file."""
     store = jazzy_typestore()
     if type_name not in store.fielddefs:
         found = _installed_types(type_name)
@@ -49,11 +79,13 @@ def definition(type_name: str) -> Definition:
             )
         store.register({name: fields for name, fields in found.items() if name not in store.fielddefs})
     text, _ = store.generate_msgdef(type_name, ros_version=2)
-    return Definition(type_name, "ros2msg", text, store.hash_rihs01(type_name))
+    return Definition(type_name, ENCODING, text, store.hash_rihs01(type_name))
 
 
 def _installed_types(type_name: str) -> dict[str, object]:
     """Parse the .msg file of a type and those of the types that it is made of, as far as they are installed."""
+    from rosbags.typesys import get_types_from_msg
+
     known = jazzy_typestore().fielddefs
     found: dict[str, object] = {}
     wanted = [type_name]

@@ -7,13 +7,12 @@ from functools import cache
 from pathlib import Path
 
 from robot_formation import names
-from robot_formation.bag.definitions import Definition, jazzy_typestore
+from robot_formation.bag.definitions import Definition, definition
 from robot_formation.bag.qos import TopicQos
 from robot_formation.bag.transforms import Transforms
 from robot_formation.bag.write_options import DEFAULT_OPTIONS, WriteOptions
 from robot_formation.bag.writer import BagWriter
 
-_TIME_FIRST = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
 METADATA_NAME = "robot_formation"
 
 
@@ -141,8 +140,7 @@ class Recorder:
 
 @cache
 def _has_time_first(type_name: str) -> bool:
-    fields = jazzy_typestore().fielddefs[type_name][1]
-    return bool(fields) and fields[0][1][1] in _TIME_FIRST
+    return definition(type_name).begins_with_time
 
 
 def own_stamp(type_name: str, cdr: bytes) -> int | None:

@@ -10,16 +10,15 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
 from robot_formation import names
-from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.bag.odometry import ODOMETRY_TYPE, Layout, layout
+from robot_formation.bag.transform_message import Transform, pose_of, text_of, transform_message
 from robot_formation.geometry.orientation import Quaternion, Vector, quaternion
-from robot_formation.names import Message
 
 _POSES = re.compile(r"(.*)/ground_truth/([^/]+)/odom")
 _DESCRIPTIONS = re.compile(r"(.*)/([^/]+)/robot_description")
@@ -61,7 +60,7 @@ class Transforms:
     def __init__(self) -> None:
         self._templates: dict[tuple[str, str], _Template] = {}  # by namespace and robot
         self._taken: list[tuple[str, str, str, bytes, int]] = []
-        self._static: defaultdict[str, dict[str, object]] = defaultdict(dict)  # by namespace and child frame
+        self._static: defaultdict[str, dict[str, Transform]] = defaultdict(dict)  # by namespace and child frame
 
     def take(self, topic: str, type_name: str, cdr: bytes, stamp_ns: int) -> None:
         """Keep a message if it says where a frame is."""
@@ -89,21 +88,18 @@ class Transforms:
                 yield TransformMessage(_inside(namespace, names.TF), made, stamp_ns)
                 continue
             try:
-                message = jazzy_typestore().deserialize_cdr(cdr, type_name)
-            except Exception:  # the decoder has no error of its own; what can't be read says of no frame where it is
+                fixed = list(_of_description(robot, text_of(cdr))) if type_name == _STRING else [pose_of(cdr)]
+            except ValueError:  # what can't be read says of no frame where it is
                 continue
-            if type_name == _STRING:
-                fixed = list(_of_description(robot, message.data))
-            else:
-                transform = _of_odometry(message)
-                first = _message(_inside(namespace, names.TF), [transform], stamp_ns)
+            if type_name == ODOMETRY_TYPE:
+                first = _message(_inside(namespace, names.TF), fixed, stamp_ns)
                 yield first
-                fixed = [_transform(message.header, f"{robot}/{names.ODOM_FRAME}", transform.transform)]
+                fixed = [fixed[0]._replace(child=f"{robot}/{names.ODOM_FRAME}")]
                 if (places := layout(cdr)) is not None:
                     self._templates[namespace, robot] = _Template(cdr, places, first.cdr)
             for transform in fixed:
-                if transform.child_frame_id not in self._static[namespace]:
-                    self._static[namespace][transform.child_frame_id] = transform
+                if transform.child not in self._static[namespace]:
+                    self._static[namespace][transform.child] = transform
                     new[namespace].append(stamp_ns)
         # All of them each time: whoever asks for the latest message on a latched topic gets one only.
         for namespace, stamps in new.items():
@@ -125,14 +121,6 @@ def _matched(topic: str, type_name: str) -> re.Match[str] | None:
 @lru_cache(maxsize=_TOPICS)
 def _inside(namespace: str, topic: names.Topic) -> names.Topic:
     return replace(topic, name=names.absolute(namespace, topic.name))
-
-
-def _of_odometry(message: Message) -> Message:
-    types = jazzy_typestore().types
-    pose = message.pose.pose
-    place = types["geometry_msgs/msg/Vector3"](pose.position.x, pose.position.y, pose.position.z)
-    turn = types["geometry_msgs/msg/Transform"](place, pose.orientation)
-    return _transform(message.header, message.child_frame_id, turn)
 
 
 def description_root(text: str) -> ElementTree.Element | None:
@@ -166,29 +154,15 @@ def read_vector(text: str) -> Vector:
     return (x, y, z)
 
 
-def _of_description(robot: str, text: str) -> Iterator[Message]:
+def _of_description(robot: str, text: str) -> Iterator[Transform]:
     """Make one transform per joint of a URDF; a text that is none gives none."""
-    types = jazzy_typestore().types
     root = description_root(text)
     for joint in [] if root is None else root.iter("joint"):
         parent, child, origin = joint.find("parent"), joint.find("child"), origin_of(joint)
         if parent is None or child is None or origin is None:
             continue
-        place, turn = origin
-        header = types["std_msgs/msg/Header"](
-            types["builtin_interfaces/msg/Time"](0, 0), f"{robot}/{parent.get('link', '')}"
-        )
-        transform = types["geometry_msgs/msg/Transform"](
-            types["geometry_msgs/msg/Vector3"](*place), types["geometry_msgs/msg/Quaternion"](*turn)
-        )
-        yield _transform(header, f"{robot}/{child.get('link', '')}", transform)
+        yield Transform((0, 0), f"{robot}/{parent.get('link', '')}", f"{robot}/{child.get('link', '')}", *origin)
 
 
-def _transform(header: Message, child: str, transform: Message) -> object:
-    return jazzy_typestore().types["geometry_msgs/msg/TransformStamped"](header, child, transform)
-
-
-def _message(topic: names.Topic, transforms: list[object], stamp_ns: int) -> TransformMessage:
-    store = jazzy_typestore()
-    message = store.types[topic.type](transforms)
-    return TransformMessage(topic, bytes(store.serialize_cdr(message, topic.type)), stamp_ns)
+def _message(topic: names.Topic, transforms: Sequence[Transform], stamp_ns: int) -> TransformMessage:
+    return TransformMessage(topic, transform_message(transforms), stamp_ns)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robot_formation import conversions, names
+from robot_formation.bag.transforms import Transforms
 from robot_formation.names import Message
 
 
@@ -27,8 +28,6 @@ class LiveTransforms:
     """
 
     def __init__(self, namespace: str) -> None:
-        from robot_formation.bag.transforms import Transforms  # it loads rosbags: only where it is needed
-
         self._namespace = namespace
         self._maker = Transforms()
         self._topics = {names.absolute(namespace, topic.name): topic for topic in (names.TF, names.TF_STATIC)}
