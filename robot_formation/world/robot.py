@@ -162,15 +162,15 @@ class Robot:
         return True
 
     def pushed(self) -> bool:
-        """Whether another body, in contact with some robot, has pushed this sleeping one hard enough to wake it.
+        """Whether another body has just pushed a sleeping robot hard enough to wake it.
 
         A lighter touch is held by its tyres. Without this limit two robots that press against each other would wake
         each other for ever.
         """
-        self.body.forget_pose()
         linear, angular = self.body.speed_squares()
         if linear == angular == 0.0:
             return False
+        self.body.forget_pose()
         if self.held or self._slow(linear, angular):
             self.body.freeze()
             return False

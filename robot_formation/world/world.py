@@ -232,8 +232,8 @@ class World:
             return False
         pybullet.stepSimulation(self._client)
         self.step_count += 1
-        # Nothing but another body moves a sleeper. Asking for contacts costs as much as one robot's velocity.
-        if sleepers and _read_contacts(physicsClientId=self._client):
+        # Nothing but another body moves a sleeper. Asking for contacts costs as much as asking one robot.
+        if len(sleepers) == 1 or (sleepers and _read_contacts(physicsClientId=self._client)):
             for robot in sleepers:
                 if robot.pushed():
                     robot.disturb()
