@@ -53,7 +53,8 @@ class Component:
     A component that has finished sets `exit_code`; its host then ends with it. One that has failed, but stays for the
     sake of the others, sets `held_code`, with which its host ends when the run does. A host that reports health gives a
     `wall_clock` (seconds, from any origin), to measure how long work takes and for nothing else. One that knows that
-    nobody will ever hear some outputs says so by `wanted(topic)`; what is costly to make isn't made for them.
+    nobody will ever hear some outputs says so by `wanted(topic)`; what is costly to make isn't made for them. What is
+    sent may be serialised already (`bytes`): hosts give receivers the message.
     """
 
     fixed: ClassVar[Mapping[str, str]] = {"*": "a run's results rest on it from the start on"}

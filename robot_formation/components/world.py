@@ -341,9 +341,10 @@ class WorldComponent(Component):
             return
         odom, pose_topic, path_topic = self._truth[robot]
         to_world = state.pose.matrix()
+        place, orientation = state.pose.position, state.pose.orientation
         odometry = conversions.body_odometry(
-            state.pose.position,
-            state.pose.orientation,
+            place,
+            orientation,
             to_world.T @ np.array(state.linear_m_s),
             to_world.T @ np.array(state.angular_rad_s),
             frame=names.WORLD_FRAME,
@@ -352,9 +353,9 @@ class WorldComponent(Component):
         )
         self._send(odom, odometry)
         if event.final:
-            pose = conversions.pose_of(odometry)
+            pose = conversions.pose(place, orientation, names.WORLD_FRAME, event.stamp_ns)
             self._send(pose_topic, pose)
-            path = self._trails[robot].add(state.pose.position, pose)
+            path = self._trails[robot].add(place, pose)
             if path is not None:
                 self._send(path_topic, conversions.path(path, names.WORLD_FRAME, event.stamp_ns))
 

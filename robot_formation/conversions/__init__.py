@@ -10,6 +10,7 @@ from robot_formation.network.loading_ros import require_ros
 require_ros()  # before the imports below load it
 
 from robot_formation.conversions.basics import (  # noqa: E402
+    as_message,
     clock,
     diagnostics,
     from_cdr,
@@ -38,8 +39,8 @@ from robot_formation.conversions.motion import (  # noqa: E402
     odometry,
     path,
     place,
+    pose,
     pose_array,
-    pose_of,
     read_covariance,
     read_displacement,
     read_joint_command,
@@ -65,6 +66,7 @@ __all__ = [
     "BLOCK_DTYPE",
     "NO_ESTIMATE",
     "MessageError",
+    "as_message",
     "blocks",
     "body_odometry",
     "camera_info",
@@ -83,8 +85,8 @@ __all__ = [
     "odometry",
     "path",
     "place",
+    "pose",
     "pose_array",
-    "pose_of",
     "read_blocks",
     "read_clock",
     "read_covariance",

@@ -27,13 +27,18 @@ def message_class(type_name: str) -> type[Message]:
 
 
 def to_cdr(message: Message) -> bytes:
-    """Serialise a message as it goes over the wire and into a bag."""
-    return serialize_message(message)  # type: ignore[no-any-return]
+    """Serialise a message as it goes over the wire and into a bag; one that is serialised already stays as it is."""
+    return message if isinstance(message, bytes) else serialize_message(message)  # type: ignore[no-any-return]
 
 
 def from_cdr(data: bytes, type_name: str) -> Message:
     """Deserialise a message of 'package/msg/Name'."""
     return deserialize_message(data, message_class(type_name))
+
+
+def as_message(message: Message, type_name: str) -> Message:
+    """Return a message of 'package/msg/Name' that may be serialised, as an object."""
+    return from_cdr(message, type_name) if isinstance(message, bytes) else message
 
 
 def to_time(stamp_ns: int) -> Time:

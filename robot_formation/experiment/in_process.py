@@ -47,9 +47,9 @@ class InProcessRun:
         scenario: what to run.
         recorder: where the messages go, if anywhere.
         images: whether pictures are recorded too.
-        listen: called with every absolute topic name and message, before the components get it.
-        heard: the absolute names of all topics that `listen` does something with; None: any. Of others, those that no
-            component hears and that are costly to make are left out.
+        listen: called with absolute topic names and messages, before the components get them.
+        heard: the absolute names of all topics that `listen` does something with; None: any. It is not called with
+            others, and those that no component hears and that are costly to make are left out.
         on_pose: called with every pose of a robot as it is published, without a message made for it.
     """
 
@@ -140,9 +140,13 @@ class InProcessRun:
             name, topic, message = queue.popleft()
             if self.recorder is not None and (self.images or topic.type != IMAGE_TYPE):
                 self.recorder.record_as(name, topic, conversions.to_cdr(message))
-            if self.listen is not None:
-                self.listen(name, message)
-            for handler in self._handlers.get(name, ()):
+            handlers = self._handlers.get(name, ())
+            listen = self.listen if self.heard is None or name in self.heard else None
+            if handlers or listen:
+                message = conversions.as_message(message, topic.type)
+            if listen is not None:
+                listen(name, message)
+            for handler in handlers:
                 handler(message)
 
 
@@ -178,7 +182,8 @@ def run_in_process(
     """
     began = time.monotonic()
     progress = progress_of(scenario, say)
-    run = InProcessRun(scenario, None, images, progress.listen)  # may refuse its parameters: no bag is begun then
+    # It may refuse its parameters: no bag is begun then.
+    run = InProcessRun(scenario, None, images, progress.listen, frozenset(progress.topics))
     with contextlib.ExitStack() as stack:
         if bag is not None:
             stack.enter_context(reservation or PathReservation(bag))

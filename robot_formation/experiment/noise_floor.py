@@ -52,7 +52,7 @@ class IdealRun(InProcessRun):
 
     def _send(self, namespace: str, topic: names.Topic, message: Message) -> None:
         if (robot := self._odometry.get(names.absolute(namespace, topic.name))) is not None:
-            self._poses[robot] = _pose(message.pose.pose)
+            self._poses[robot] = _pose(conversions.as_message(message, topic.type).pose.pose)
         elif topic == names.ALIGNMENT and AlignmentState.parse(message.data) is AlignmentState.PREDICT:
             self._predicting.add(namespace)
         elif topic == names.MOVE and namespace in self._predicting:

@@ -22,10 +22,9 @@ def recorded() -> list[bytes]:
 
 
 def one(child: str, x_m: float, stamp_ns: int, turn: Quaternion = (0.0, 0.6, 0.0, 0.8)) -> bytes:
-    message = conversions.body_odometry(
+    return conversions.body_odometry(
         (x_m, 2.0, 3.0), turn, (0.0,) * 3, (0.0,) * 3, frame="world", child=child, stamp_ns=stamp_ns
     )
-    return conversions.to_cdr(message)
 
 
 def poses_of(cdr: list[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:

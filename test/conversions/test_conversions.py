@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 from sensor_msgs.msg import Image, JointState, PointField
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
 
 from robot_formation import conversions
 from robot_formation.conversions import MessageError
@@ -251,10 +255,7 @@ def test_yaw_is_read_from_a_tilted_pose_too(roll: float, pitch: float, yaw: floa
         ]
     )
     x, y, z, w = np.linalg.eigh(form)[1][:, -1]
-    message = conversions.body_odometry(
-        (1, 2, 3), (x, y, z, w), (4, 5, 6), (7, 8, 9), frame="world", child="leader/base_link", stamp_ns=5
-    )
-    found = conversions.read_pose(conversions.pose_of(message).pose)
+    found = conversions.read_pose(conversions.pose((1, 2, 3), (x, y, z, w), "world", 5).pose)
     assert (found.x_m, found.y_m) == (1.0, 2.0)
     assert found.yaw_rad == pytest.approx(yaw, abs=1e-9)
 
@@ -266,14 +267,17 @@ def test_an_orientation_of_zeros_is_no_turn() -> None:
 
 
 def test_odometry_has_its_frames_pose_and_velocities_in_their_fields() -> None:
-    message = conversions.body_odometry(
-        (1, 2, 3), (0, 0, 0, 1), (4, 5, 6), (7, 8, 9), frame="world", child="leader/base_link", stamp_ns=5
+    data = conversions.body_odometry(
+        (1, 2, 3), (0, 0, 0, 1), (4, 5, 6), (7, 8, 9), frame="world", child="leader/base_link", stamp_ns=5 * 10**9 + 7
     )
+    message = conversions.from_cdr(data, "nav_msgs/msg/Odometry")
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (5, 7)
     assert (message.header.frame_id, message.child_frame_id) == ("world", "leader/base_link")
     assert message.pose.pose.position.z == 3.0
     assert (message.twist.twist.linear.x, message.twist.twist.angular.z) == (4.0, 9.0)
-    pose = conversions.pose_of(message)
-    assert pose.header == message.header
+    assert not any([*message.pose.covariance, *message.twist.covariance])
+    pose = conversions.pose((1, 2, 3), (0, 0, 0, 1), "world", 5 * 10**9 + 7)
+    assert (pose.header, pose.pose) == (message.header, message.pose.pose)
     assert conversions.path([pose, pose], "world", 7).poses == [pose, pose]
     planar = conversions.odometry(Motion(1.0, 2.0, 0.5), "leader/odom", "leader/base_link", 3)
     close(conversions.read_pose(planar.pose.pose), Motion(1.0, 2.0, 0.5))
@@ -449,7 +453,45 @@ def test_health_has_its_level_text_and_values() -> None:
 def test_a_mesh_becomes_three_coloured_corners_per_triangle() -> None:
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]])
     colours = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    marker = conversions.surface_marker(vertices, colours, np.array([[0, 1, 3], [0, 3, 2]]), "world")
+    data = conversions.surface_marker(vertices, colours, np.array([[0, 1, 3], [0, 3, 2]]), "world")
+    marker = conversions.from_cdr(data, "visualization_msgs/msg/Marker")
     assert [(p.x, p.y, p.z) for p in marker.points[3:]] == [(0, 0, 0), (1, 1, 1), (0, 1, 0)]
     assert [(c.r, c.g, c.b, c.a) for c in marker.colors[:3]] == [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, 1, 1)]
     assert marker.header.frame_id == "world"
+
+
+@pytest.mark.parametrize("frame", ["", "w", "wo", "wor", "worl", "world", "world2", "world23"])
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_messages_made_serialised_are_those_of_the_message_classes(frame: str, count: int) -> None:
+    """With names of all lengths: numbers behind them lie at multiples of their size."""
+    marker = Marker(ns="surface", type=Marker.TRIANGLE_LIST, action=Marker.ADD)
+    marker.header.frame_id = frame
+    marker.pose.orientation.w = marker.scale.x = marker.scale.y = marker.scale.z = marker.color.a = 1.0
+    for _ in range(count):
+        marker.points += [Point(x=1.0, y=2.0, z=3.0), Point(x=4.0, y=5.0, z=6.0), Point(x=7.0, y=8.0, z=9.0)]
+        marker.colors += [ColorRGBA(r=0.25 * part, g=0.5, b=1.0, a=1.0) for part in range(3)]
+    vertices, shades = np.arange(1.0, 10.0).reshape(3, 3), np.array([[0.25 * part, 0.5, 1.0] for part in range(3)])
+    data = conversions.surface_marker(vertices, shades, np.array([[0, 1, 2]] * count, np.int64).reshape(-1, 3), frame)
+    assert conversions.from_cdr(data, "visualization_msgs/msg/Marker") == marker
+    assert len(data) == len(conversions.to_cdr(marker))
+    odometry = Odometry(child_frame_id=f"{frame}/child")
+    odometry.header.frame_id, odometry.header.stamp.sec = frame, -3
+    pose, twist = odometry.pose.pose, odometry.twist.twist
+    pose.position.x, pose.position.z, pose.orientation.w, twist.linear.y, twist.angular.z = (
+        1.5,
+        -2.5,
+        1.0,
+        0.5,
+        math.inf,
+    )
+    data = conversions.body_odometry(
+        (1.5, 0, -2.5),
+        (0, 0, 0, 1),
+        (0, 0.5, 0),
+        (0, 0, math.inf),
+        frame=frame,
+        child=f"{frame}/child",
+        stamp_ns=-3 * 10**9,
+    )
+    assert conversions.from_cdr(data, "nav_msgs/msg/Odometry") == odometry
+    assert len(data) == len(conversions.to_cdr(odometry))

@@ -14,7 +14,7 @@ from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun, run_in_process
 from robot_formation.experiment.run_result import RunError
 from robot_formation.experiment.scenario import Scenario, load_track, override
-from robot_formation.names import Topic
+from robot_formation.names import Topic, absolute
 
 pytestmark = pytest.mark.slow
 
@@ -62,13 +62,20 @@ def test_without_the_ground_the_analysis_is_the_same() -> None:
     assert repr(analyse(bare).to_json()) == repr(analyse(whole).to_json())
 
 
-def test_what_nobody_hears_is_not_made() -> None:
+def test_what_nobody_hears_is_not_made_and_no_other_topic_is_told() -> None:
     scenario = override(load_track("two"), ["leader.timesteps=1", "world.camera.mode=on_demand"])
     made: list[set[str]] = []
+
+    class Run(InProcessRun):
+        def _send(self, namespace: str, topic: Topic, message: Any) -> None:
+            made[-1].add(absolute(namespace, topic.name))
+            super()._send(namespace, topic, message)
+
     for heard in (None, {"/ground_truth/leader/odom"}, set[str]()):
-        topics: set[str] = set()
-        InProcessRun(scenario, listen=lambda topic, message, into=topics: into.add(topic), heard=heard).run()  # type: ignore[misc]
-        made.append(topics)
+        made.append(set())
+        told: set[str] = set()
+        Run(scenario, listen=lambda topic, message, into=told: into.add(topic), heard=heard).run()  # type: ignore[misc]
+        assert told == (made[-1] if heard is None else heard)
     truth = {robot: {f"/ground_truth/{robot}/{kind}" for kind in ("odom", "pose", "path")} for robot in scenario.robots}
     assert made[0] - made[1] == {"/surface", "/clock"} | truth["follower_1"]
     assert made[1] - made[2] == truth["leader"]

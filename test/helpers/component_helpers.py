@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from robot_formation import conversions
 from robot_formation.components.base import Place
 from robot_formation.components.catalogue import KINDS
 from robot_formation.names import Topic
@@ -20,6 +21,7 @@ class Wire:
 
     def _send(self, topic: Topic, message: Any) -> None:
         assert topic in self.component.outputs(), f"{topic.name} is no output"
+        message = conversions.as_message(message, topic.type)
         assert type(message).__name__ == topic.type.rsplit("/", 1)[-1]
         self.sent.append((topic.name, message))
 
