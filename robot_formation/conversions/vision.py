@@ -23,10 +23,8 @@ def image(pixels: NDArray[np.uint8], frame: str, stamp_ns: int) -> Image:
     encoding, channels = ("mono8", 1) if pixels.ndim == 2 else ("rgb8", 3)
     message = stamped(Image, stamp_ns, frame, height=height, width=width, encoding=encoding)
     message.step = channels * width
-    # Assigning an array('B') is checked at once, a list byte by byte.
-    data = array.array("B")
-    data.frombytes(np.ascontiguousarray(pixels).data.cast("B"))
-    message.data = data
+    # Into the message's own array: one that is assigned is copied once more.
+    message.data.frombytes(np.ascontiguousarray(pixels).data.cast("B"))
     return message
 
 

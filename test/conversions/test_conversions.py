@@ -58,7 +58,7 @@ def test_nanoseconds_come_back_exactly(stamp: int) -> None:
 @given(stamp=stamps)
 def test_headers_and_the_clock_carry_the_stamp(stamp: int) -> None:
     assert conversions.stamp_of(conversions.move(Motion(), "leader/base_link", stamp)) == stamp
-    assert conversions.to_ns(conversions.clock(stamp).clock) == stamp
+    assert conversions.read_clock(conversions.from_cdr(conversions.clock(stamp), "rosgraph_msgs/msg/Clock")) == stamp
 
 
 # --- joints -----------------------------------------------------------------------------------------------------------

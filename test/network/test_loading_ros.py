@@ -6,7 +6,7 @@ import sys
 LOADED = """
 import sys
 from robot_formation import conversions
-conversions.clock(1).clock
+conversions.to_time(1)
 from std_msgs.msg import String
 String.__class__.__import_type_support__()
 print(String.__class__._TYPE_SUPPORT is not None, "lark" in sys.modules)
