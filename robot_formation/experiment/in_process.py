@@ -28,6 +28,7 @@ from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import IMAGE_TYPE, Message, Topic, absolute
 from robot_formation.plugins import PluginError
 from robot_formation.schedule.schedules import Spacing
+from robot_formation.system.garbage import rare_collections
 from robot_formation.world.events import RobotPose
 
 P = TypeVar("P")
@@ -83,7 +84,8 @@ class InProcessRun:
             RunError: if everybody waits for somebody, which no run should come to.
         """
         try:
-            return self._run()
+            with rare_collections():
+                return self._run()
         finally:
             for hosted in self._hosted:
                 hosted.component.close()
