@@ -20,6 +20,8 @@ _LARGEST_CHANGE_RAD = 0.3
 """Bound on an iteration's change of the heading: farther away the linearisation doesn't hold."""
 _DIFFERENCE = 1e-4
 """Step of the central differences, m, rad or 1/m: an edge moves by about 0.1 px at most."""
+_OFFSETS = _DIFFERENCE * np.concatenate([np.zeros((1, SIZE)), np.eye(SIZE), -np.eye(SIZE)])
+"""From a state to all those at which a linearisation looks."""
 _STRAY_SIGMAS = 1.5
 """Residual, in standard deviations, from which on an edge pulls with limited force; 1.345 is usual (Huber)."""
 _WORST_RESIDUALS, _OUTLIER_SIGMAS = 9.0, 2.5
@@ -54,6 +56,12 @@ class Hypothesis:
         return finite and math.hypot(x, y) < _FARTHEST_M and abs(yaw) < _LARGEST_YAW_RAD
 
 
+def _plus_diagonal(matrix: Matrix, diagonal: Vector) -> Matrix:
+    """Add to the diagonal of a square matrix, in place: half the time of a second matrix."""
+    matrix.flat[:: len(matrix) + 1] += diagonal
+    return matrix
+
+
 class LookUpdate:
     """Brings hypotheses and looks together."""
 
@@ -68,15 +76,15 @@ class LookUpdate:
             return
         measured = np.array([edge.position_px for edge in edges])
         sigmas = np.array([edge.sigma_px for edge in edges])
-        noise = np.diag(sigmas**2)
+        variance = sigmas**2
         prior, covariance = hypothesis.state, hypothesis.covariance
         state = prior
         for number in range(_ITERATIONS):
             h, predicted = self._linearise(state, edges)
             # Huber's weights: an edge that contradicts the others, as of a broken block, pulls with limited force.
             strays = np.maximum(1.0, np.abs(measured - predicted) / (_STRAY_SIGMAS * sigmas)) if number else 1.0
-            noise = np.diag(sigmas**2 * strays)
-            scatter = h @ covariance @ h.T + noise
+            variance = sigmas**2 * strays
+            scatter = _plus_diagonal(h @ covariance @ h.T, variance)
             gain = np.linalg.solve(scatter, h @ covariance).T
             change = prior + gain @ (measured - predicted - h @ (prior - state)) - state
             change[YAW] = max(-_LARGEST_CHANGE_RAD, min(_LARGEST_CHANGE_RAD, change[YAW]))
@@ -85,10 +93,10 @@ class LookUpdate:
                 break
         h, predicted = self._linearise(state, edges)
         kept = np.eye(SIZE) - gain @ h
-        hypothesis.covariance = kept @ covariance @ kept.T + gain @ noise @ gain.T
+        hypothesis.covariance = kept @ covariance @ kept.T + (gain * variance) @ gain.T
         hypothesis.state = state
         residual, way = measured - predicted, state - prior
-        hypothesis.cost += float(residual @ (residual / np.diag(noise)) + way @ np.linalg.solve(covariance, way))
+        hypothesis.cost += float(residual @ (residual / variance) + way @ np.linalg.solve(covariance, way))
         hypothesis.cost += float(np.linalg.slogdet(scatter)[1])
         hypothesis.cost += self._contradiction(state, seen)
 
@@ -105,9 +113,8 @@ class LookUpdate:
         for hypothesis in hypotheses:
             h, predicted = self._linearise(hypothesis.state, seen.edges)
             innovation = np.array([edge.position_px for edge in seen.edges]) - predicted
-            scatter = h @ hypothesis.covariance @ h.T + np.diag(
-                [_NIS_SIGMAS**2 * edge.sigma_px**2 for edge in seen.edges]
-            )
+            variance = np.array([_NIS_SIGMAS**2 * edge.sigma_px**2 for edge in seen.edges])
+            scatter = _plus_diagonal(h @ hypothesis.covariance @ h.T, variance)
             costs.append(float(innovation @ np.linalg.solve(scatter, innovation)) / len(seen.edges))
         return min(costs)
 
@@ -121,8 +128,7 @@ class LookUpdate:
         return float(np.sum(ratios**2 / strays)) + self._contradiction(state, seen)
 
     def _linearise(self, state: Vector, edges: Sequence[Edge]) -> tuple[Matrix, Vector]:
-        steps = _DIFFERENCE * np.eye(SIZE)
-        found = self._model.edges(np.concatenate([state[None], state + steps, state - steps]), edges)
+        found = self._model.edges(state + _OFFSETS, edges)
         return ((found[1 : SIZE + 1] - found[SIZE + 1 :]) / (2.0 * _DIFFERENCE)).T, found[0]
 
     def _trusted(self, state: Vector, seen: View) -> list[Edge]:
