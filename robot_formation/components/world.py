@@ -28,6 +28,8 @@ from robot_formation.world.pushes import Push
 from robot_formation.world.world import World
 
 _MESH_CELLS = 40
+_CLOCK_PERIOD_NS = 100_000_000
+"""Of `/clock` with `timer`."""
 
 
 class WorldComponent(Component):
@@ -43,6 +45,7 @@ class WorldComponent(Component):
         self._set_up(parameters, 0)
         self._next = parameters
         self._paused = False
+        self._told_ns = -_CLOCK_PERIOD_NS
         self.on_pose: Callable[[RobotPose], None] | None = None
         """Is told every pose as it is published: who is in the same process needs no message of it."""
         self._cameras = [start.name for start in parameters.starts() if start.camera]
@@ -209,6 +212,15 @@ class WorldComponent(Component):
         self._overhead.after(events, self._world, self._send)
 
     def _tell_time(self) -> None:
+        """Publish the time; with `timer` seldom, but at the end of each period, when robots may begin something.
+
+        There every robot hears it, and each of many robots adds instants of its own.
+        """
+        end_ns = self._awaited.period_end_ns
+        period_lasts = end_ns is not None and self.stamp_ns - self._world.start_ns < end_ns
+        if period_lasts and 0 <= self.stamp_ns - self._told_ns < _CLOCK_PERIOD_NS:
+            return
+        self._told_ns = self.stamp_ns
         if self.wanted(self._clock):
             self._send(self._clock, conversions.clock(self.stamp_ns))
 

@@ -1,10 +1,12 @@
 """Whole runs by each schedule, in process: who waits for whom, what it costs in time, and what lags."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from robot_formation import conversions
 from robot_formation.analysis.chain import moves_of_timestep
 from robot_formation.analysis.quantities import RunAnalysis, analyse
 from robot_formation.analysis.run_record import RunRecord
@@ -13,6 +15,7 @@ from robot_formation.experiment.in_memory_record import run_in_memory
 from robot_formation.experiment.in_process import InProcessRun
 from robot_formation.experiment.scenario import Scenario, load, load_track, override, presets
 from robot_formation.geometry.se2 import Motion
+from robot_formation.schedule.schedules import begin_s
 
 pytestmark = pytest.mark.xdist_group("schedules")
 
@@ -68,6 +71,21 @@ def test_the_timer_has_no_ticks() -> None:
     code, _ = InProcessRun(scenario("schedule=timer"), listen=lambda name, message: heard.add(name)).run()
     assert code == 0
     assert not [name for name in heard if name.startswith("/formation/")]
+
+
+def test_the_clock_is_rare_with_the_timer_but_tells_the_end_of_each_period() -> None:
+    told: dict[str, list[int]] = {"turns": [], "timer": []}
+    for schedule, stamps in told.items():
+        InProcessRun(
+            scenario(f"schedule={schedule}"),
+            listen=lambda name, message, into=stamps: into.append(conversions.read_clock(message)),  # type: ignore[misc]
+            heard={"/clock"},
+        ).run()
+    assert min(later - earlier for earlier, later in pairwise(told["turns"])) < 10**8
+    ends = {round(1e9 * begin_s(timestep, scenario("schedule=timer").leader.period_s)) for timestep in range(1, 5)}
+    assert ends <= set(told["timer"])
+    others = [stamp for stamp in told["timer"] if stamp not in ends and stamp < max(ends)]
+    assert min(later - earlier for earlier, later in pairwise(others)) >= 10**8
 
 
 def test_timesteps_of_the_timer_begin_by_the_clock() -> None:
