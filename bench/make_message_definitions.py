@@ -3,7 +3,7 @@
 `robot_formation/bag/message_definitions.json` spares a recorder the loading of that store. A test says when the file
 lacks a type or differs.
 
-Run: python bench/make_message_definitions.py [--check]
+Run: python bench/make_message_definitions.py
 """
 
 from __future__ import annotations
@@ -29,14 +29,9 @@ def as_json() -> str:
 
 
 def main() -> int:
-    """Write or check the file."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if the file differs")
-    check = parser.parse_args().check
-    text = as_json()
-    if check:
-        return int(not DEFINITIONS_FILE.is_file() or DEFINITIONS_FILE.read_text(encoding="utf-8") != text)
-    DEFINITIONS_FILE.write_text(text, encoding="utf-8")
+    """Write the file."""
+    argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0]).parse_args()
+    DEFINITIONS_FILE.write_text(as_json(), encoding="utf-8")
     print(DEFINITIONS_FILE)
     return 0
 

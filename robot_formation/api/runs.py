@@ -254,8 +254,8 @@ def _in_memory(definition: Definition, say: Callable[[str], None]) -> Run:
     from robot_formation.experiment.in_process import progress_of
     from robot_formation.launching.processes import run_metadata
 
-    listen = progress_of(definition, say).listen
-    record, result = run_with_details(definition, run_metadata(definition), beside=listen)
+    progress = progress_of(definition, say)
+    record, result = run_with_details(definition, run_metadata(definition), beside=progress)
     return Run(record, analyse(record), None, True, result.reason, tuple(result.warnings))
 
 

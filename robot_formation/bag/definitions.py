@@ -32,10 +32,11 @@ class Definition(NamedTuple):
 
     @property
     def begins_with_time(self) -> bool:
-        """Whether the first thing in a message is a time: its own, or that of its header."""
-        fields = (line.split() for line in self.text.partition("=" * 80)[0].splitlines())
-        # A constant has "=" in its line.
-        first = next((words for words in fields if words and not any("=" in word for word in words)), None)
+        """Whether the first field of a message is a Time or a Header."""
+        lines = (line.split() for line in self.text.partition("=" * 80)[0].splitlines())
+        # A constant is `type NAME=value`; a bounded type has a "=" too (`string<=10 name`).
+        fields = (words for words in lines if len(words) > 1 and "=" not in words[1])
+        first = next(fields, None)
         return first is not None and first[0] in _TIMES
 
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from robot_formation.bag.definitions import jazzy_typestore
 from robot_formation.bag.errors import BagError
+from robot_formation.system.cdr import HEAD, gap
 
 ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
-_HEAD = 4  # of a CDR message: what follows is aligned from here on
 _TIME = 8  # sec and nanosec, which come first
 _LITTLE_ENDIAN = 1
 _POSE_NUMBERS = 7  # x, y, z of the place, x, y, z, w of the orientation
@@ -95,18 +95,18 @@ class Layout(NamedTuple):
 
 def layout(cdr: bytes) -> Layout | None:
     """Find the parts of a message; None if it is too short or has another byte order."""
-    if cdr[:2] != bytes([0, _LITTLE_ENDIAN]):
+    if cdr[:2] != HEAD[:2]:
         return None
-    frames, end = [], _HEAD + _TIME
+    frames, end = [], len(HEAD) + _TIME
     for _ in range(2):
-        start = _aligned(end, 4)  # bytes that align hold anything
+        start = end + gap(end, 4)  # bytes that align hold anything
         end = start + 4 + int.from_bytes(cdr[start : start + 4], "little")
         frames.append(slice(start, end))
-    first = _aligned(end, 8)
+    first = end + gap(end, 8)
     last = first + 8 * _POSE_NUMBERS
     if last > len(cdr):
         return None
-    return Layout(slice(_HEAD, _HEAD + _TIME), (frames[0], frames[1]), slice(first, last))
+    return Layout(slice(len(HEAD), len(HEAD) + _TIME), (frames[0], frames[1]), slice(first, last))
 
 
 def _columns(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
@@ -122,7 +122,3 @@ def _columns(cdr: Sequence[bytes]) -> tuple[NDArray[np.int64], NDArray[np.float6
     stamps = table[:, places.time].copy().view("<u4").astype(np.int64)
     seconds = stamps[:, 0].astype(np.int32).astype(np.int64)  # signed, as the message has it
     return seconds * 10**9 + stamps[:, 1], table[:, places.pose].copy().view("<f8").astype(float)
-
-
-def _aligned(place: int, size: int) -> int:
-    return place + -(place - _HEAD) % size

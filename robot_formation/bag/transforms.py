@@ -88,13 +88,16 @@ class Transforms:
                 yield TransformMessage(_inside(namespace, names.TF), made, stamp_ns)
                 continue
             try:
-                fixed = list(_of_description(robot, text_of(cdr))) if type_name == _STRING else [pose_of(cdr)]
+                if type_name == _STRING:
+                    fixed = list(_of_description(robot, text_of(cdr)))
+                else:
+                    pose = pose_of(cdr)
+                    first = _message(_inside(namespace, names.TF), [pose], stamp_ns)
+                    fixed = [pose._replace(child=f"{robot}/{names.ODOM_FRAME}")]
             except ValueError:  # what can't be read says of no frame where it is
                 continue
             if type_name == ODOMETRY_TYPE:
-                first = _message(_inside(namespace, names.TF), fixed, stamp_ns)
                 yield first
-                fixed = [fixed[0]._replace(child=f"{robot}/{names.ODOM_FRAME}")]
                 if (places := layout(cdr)) is not None:
                     self._templates[namespace, robot] = _Template(cdr, places, first.cdr)
             for transform in fixed:

@@ -29,7 +29,7 @@ from robot_formation.world.world import World
 
 _MESH_CELLS = 40
 _CLOCK_PERIOD_NS = 100_000_000
-"""Of `/clock` with `timer`."""
+"""Least time between two messages of `/clock` with `timer`, but for the ends of periods."""
 
 
 class WorldComponent(Component):
@@ -214,11 +214,12 @@ class WorldComponent(Component):
     def _tell_time(self) -> None:
         """Publish the time; with `timer` seldom, but at the end of each period, when robots may begin something.
 
-        There every robot hears it, and each of many robots adds instants of its own.
+        With `timer` every robot hears it, and each of many robots adds instants of its own.
         """
         end_ns = self._awaited.period_end_ns
-        period_lasts = end_ns is not None and self.stamp_ns - self._world.start_ns < end_ns
-        if period_lasts and 0 <= self.stamp_ns - self._told_ns < _CLOCK_PERIOD_NS:
+        period_ends = end_ns is not None and self.stamp_ns - self._world.start_ns >= end_ns
+        seldom = self._parameters.schedule is Schedule.TIMER and not period_ends
+        if seldom and self.stamp_ns - self._told_ns < _CLOCK_PERIOD_NS:
             return
         self._told_ns = self.stamp_ns
         if self.wanted(self._clock):

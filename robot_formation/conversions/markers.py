@@ -17,7 +17,7 @@ def surface_marker(
 ) -> bytes:
     """Make a Marker of a mesh, a TRIANGLE_LIST, serialised: its numbers go into it as arrays, at once.
 
-    By way of rclpy's classes, with an object for each corner, it would take as long as two timesteps.
+    By way of rclpy's classes, with an object for each vertex, it takes 20 times as long.
 
     Args:
         vertices: (n, 3), metres.

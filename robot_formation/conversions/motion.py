@@ -188,7 +188,7 @@ def body_odometry(
     child: str,
     stamp_ns: int,
 ) -> bytes:
-    """Make an Odometry message, serialised: a full pose in `frame`, and velocities in the child frame, as it asks.
+    """Make an Odometry message, serialised: a full pose in `frame`, and velocities in the child frame (nav_msgs).
 
     A run has hundreds, mostly for a recorder alone; by way of rclpy's classes each costs ten times as much.
     """

@@ -13,6 +13,7 @@ from robot_formation.analysis.from_bag import GroundTruth, record_of, run_topics
 from robot_formation.analysis.run_record import RunRecord
 from robot_formation.bag.run_details import slots_text
 from robot_formation.experiment.in_process import InProcessRun
+from robot_formation.experiment.progress import Progress
 from robot_formation.experiment.run_result import RunResult
 from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import Message
@@ -51,7 +52,7 @@ def run_with_details(
     scenario: Scenario,
     details: Mapping[str, str],
     make_run: MakeRun | None = None,
-    beside: Callable[[str, Message], None] | None = None,
+    beside: Progress | None = None,
     *,
     ground: bool = True,
 ) -> tuple[RunRecord, RunResult]:
@@ -61,31 +62,30 @@ def run_with_details(
         scenario: what to run.
         details: what the run says of itself, as a bag's metadata has it.
         make_run: builds the run from the scenario and its listener; by default a plain `InProcessRun`.
-        beside: is called with every topic and message too.
+        beside: listens too.
         ground: see `run_in_memory`.
 
     Raises:
         FormationError: if a component refuses its parameters, or the run stands still.
     """
     # Ground truth comes as the world's own poses: a message of each would cost more than all else that is kept.
-    wanted = set(run_topics(scenario.robots)) - {names.ground_truth_odom(robot).of() for robot in scenario.robots}
+    kept = set(run_topics(scenario.robots)) - {names.ground_truth_odom(robot).of() for robot in scenario.robots}
     if not ground:
-        wanted.remove(names.SURFACE.of())
+        kept.remove(names.SURFACE.of())
     messages: dict[str, list[Message]] = defaultdict(list)
     stamps: dict[str, list[int]] = defaultdict(list)
     poses: dict[str, list[RobotPose]] = {robot: [] for robot in scenario.robots}
 
     def listen(topic: str, message: Message) -> None:
-        if topic in wanted:
+        if topic in kept:
             messages[topic].append(message)
             stamps[topic].append(run.stamp_ns)
         if beside is not None:
-            beside(topic, message)
+            beside.listen(topic, message)
 
     run = make_run(scenario, listen) if make_run is not None else InProcessRun(scenario, listen=listen)
     run.on_pose = lambda event: poses[event.robot].append(event)
-    if beside is None:
-        run.heard = wanted
+    run.heard = kept.union(beside.topics if beside is not None else ())
     code, reason = run.run()
     outcome = {"outcome": OUTCOMES.get(code, "incomplete")}
     truth = {robot: _ground_truth(events) for robot, events in poses.items() if events}

@@ -74,7 +74,7 @@ class InProcessRun:
 
     @property
     def stamp_ns(self) -> int:
-        """Simulated time, nanoseconds: what /clock has told."""
+        """Simulated time, nanoseconds."""
         return self._world.stamp_ns
 
     def run(self) -> tuple[int, str]:

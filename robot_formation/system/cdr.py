@@ -1,4 +1,4 @@
-"""What messages are made of when they are serialised without a library: numbers and texts, CDR of version 1.
+"""What messages are made of when they are serialised without a library: numbers and texts, plain CDR of version 1.
 
 Numbers lie at multiples of their size, counted from behind a head of four bytes; a text has its length before it and a
 zero byte behind it.
@@ -10,7 +10,7 @@ import struct
 
 HEAD = bytes((0, 1, 0, 0))
 """Of a message whose numbers have their low byte first."""
-_LITTLE_ENDIAN = 1
+_ORDERS = {bytes((0, 0)): ">", bytes((0, 1)): "<"}
 
 
 def gap(place: int, size: int) -> int:
@@ -33,11 +33,12 @@ def byte_order(cdr: bytes) -> str:
     """Return a message's byte order as `struct` names it.
 
     Raises:
-        ValueError: it is too short for a message.
+        ValueError: it is too short for a message, or serialised in another way.
     """
-    if len(cdr) < len(HEAD):
-        raise ValueError("the message has no head")
-    return "<" if cdr[1] & _LITTLE_ENDIAN else ">"
+    order = _ORDERS.get(bytes(cdr[:2]))
+    if order is None or len(cdr) < len(HEAD):
+        raise ValueError("the message is no plain CDR")
+    return order
 
 
 def read_text(cdr: bytes, start: int) -> tuple[str, int]:

@@ -158,7 +158,6 @@ class Body:
         pybullet.resetBasePositionAndOrientation(
             self.index, (x + ox, y + oy, z + oz), pose.orientation, physicsClientId=self._client
         )
-        self._pose = None
         self.freeze()
 
     def shift(self, pose: Pose) -> None:
@@ -169,9 +168,14 @@ class Body:
         self.encoder_speeds = speeds
 
     def freeze(self) -> None:
-        """Set all velocities to zero."""
+        """Set all velocities to zero, and keep the pose.
+
+        Bullet changes the last digit of a standing body's orientation now and then: all who ask later are told
+        this one.
+        """
         pybullet.resetBaseVelocity(self.index, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), physicsClientId=self._client)
         self.encoder_speeds = [0.0, 0.0]
+        self.read_pose()
 
     def speed_squares(self) -> tuple[float, float]:
         """Squares of the centre of mass's speed (m/s) and of the turning rate (rad/s)."""
@@ -179,16 +183,15 @@ class Body:
         return vx * vx + vy * vy + vz * vz, wx * wx + wy * wy + wz * wz
 
     def pose(self) -> Pose:
-        """Pose of base_link: the same object as long as the body has not moved."""
-        if self._pose is None:
-            (x, y, z), orientation = _read_pose(self.index, self._client)
-            ox, oy, oz = rotate(orientation, self._mass_offset)
-            self._pose = Pose((x - ox, y - oy, z - oz), orientation)
-        return self._pose
+        """Pose of base_link: the same object as long as the body stands."""
+        return self.read_pose() if self._pose is None else self._pose
 
-    def forget_pose(self) -> None:
-        """Read the pose anew when it is asked for next: another body may have moved this one."""
-        self._pose = None
+    def read_pose(self) -> Pose:
+        """Ask the physics for the pose of base_link, and keep it."""
+        (x, y, z), orientation = _read_pose(self.index, self._client)
+        ox, oy, oz = rotate(orientation, self._mass_offset)
+        self._pose = Pose((x - ox, y - oy, z - oz), orientation)
+        return self._pose
 
     def state(self) -> BodyState:
         """Pose of base_link and its velocity."""

@@ -170,10 +170,10 @@ class Robot:
         linear, angular = self.body.speed_squares()
         if linear == angular == 0.0:
             return False
-        self.body.forget_pose()
         if self.held or self._slow(linear, angular):
             self.body.freeze()
             return False
+        self.body.read_pose()
         return True
 
     def joint_states(self, stamp_ns: int, *, final: bool) -> JointStates:

@@ -79,6 +79,8 @@ class World:
         self._check_overlap()
         for robot in self._robots.values():
             robot.settle(lambda: pybullet.stepSimulation(physicsClientId=self._client))
+        for robot in self._robots.values():
+            robot.body.read_pose()
         self._frame_steps = parameters.physics_hz // parameters.camera.min_frames_per_second
         self._state_steps = parameters.physics_hz // parameters.state_rate_hz
         self._pending: dict[str, Command] = {}

@@ -5,7 +5,7 @@ import importlib.util
 import pytest
 
 from repository import ROOT
-from robot_formation.bag.definitions import DEFINITIONS_FILE, definition, jazzy_typestore, looked_up
+from robot_formation.bag.definitions import DEFINITIONS_FILE, Definition, definition, jazzy_typestore, looked_up
 from robot_formation.bag.errors import BagError
 
 TIMES = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
@@ -31,6 +31,21 @@ def test_a_type_begins_with_a_time_if_its_first_field_is_one() -> None:
     assert found == {name: expected[name] for name in found}
     assert found["sensor_msgs/msg/JoyFeedback"] is False  # begins with constants
     assert found["nav_msgs/msg/Odometry"]
+
+
+@pytest.mark.parametrize(
+    ("text", "time"),
+    [
+        ("string<=10 name\nstd_msgs/Header header", False),
+        ("float64[<=3] x\nbuiltin_interfaces/Time stamp", False),
+        ("string NAME=a b\nuint8 MOST = 3\n\nbuiltin_interfaces/Time stamp", True),
+        ("int32 x 5\nstd_msgs/Header header", False),
+        ("", False),
+    ],
+)
+def test_a_bounded_field_is_a_field_and_a_constant_is_none(text: str, time: bool) -> None:
+    below = "\n" + "=" * 80 + "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp"
+    assert Definition("package/msg/Name", "ros2msg", text + below, "").begins_with_time is time
 
 
 def test_a_type_that_nobody_knows_is_refused() -> None:

@@ -76,6 +76,12 @@ def test_a_text_that_is_none_is_refused(data: bytes) -> None:
         text_of(data)
 
 
+@pytest.mark.parametrize("head", [b"\0\3", b"\0\x0b", b"\1\1"], ids=["parameter list", "version 2", "no CDR"])
+def test_a_message_that_is_serialised_in_another_way_is_refused(head: bytes) -> None:
+    with pytest.raises(ValueError, match="no plain CDR"):
+        text_of(head + transform_message([])[2:])
+
+
 def test_numbers_that_are_none_pass_through() -> None:
     message = odometry(3, math.nan, math.inf, 0.0)
     message.header = header(3, "world")

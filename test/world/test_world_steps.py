@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from robot_formation.surface import make_surface
 from robot_formation.world.events import Event, Frame
@@ -34,6 +35,21 @@ def test_single_steps_give_the_same_events_as_going_on() -> None:
         assert by_steps.step_count == before + 1
     assert by_steps.step() == []
     assert plain(events) == plain(run(begun(world("bowl", seed=5))))
+
+
+@pytest.mark.parametrize("seed", [1, 3, 11])
+def test_who_asks_where_a_standing_robot_is_changes_no_later_answer(seed: int) -> None:
+    """Bullet changes the last digit of a standing body's orientation now and then."""
+    told = []
+    for asks in (False, True):
+        made = world("bowl", seed=seed)
+        if asks:
+            made.ground_truth("follower_1")
+        for _ in range(4):
+            made.command("leader", (2.0,) * 4, SPEEDS)
+            run(made)
+        told.append(made.ground_truth("follower_1"))
+    assert told[0] == told[1]
 
 
 def test_another_start_time_shifts_the_stamps_and_nothing_else() -> None:

@@ -57,7 +57,7 @@ class Hypothesis:
 
 
 def _plus_diagonal(matrix: Matrix, diagonal: Vector) -> Matrix:
-    """Add to the diagonal of a square matrix, in place: half the time of a second matrix."""
+    """Add to the diagonal of a square matrix, in place: that takes half as long as adding `np.diag(diagonal)`."""
     matrix.flat[:: len(matrix) + 1] += diagonal
     return matrix
 
@@ -76,7 +76,6 @@ class LookUpdate:
             return
         measured = np.array([edge.position_px for edge in edges])
         sigmas = np.array([edge.sigma_px for edge in edges])
-        variance = sigmas**2
         prior, covariance = hypothesis.state, hypothesis.covariance
         state = prior
         for number in range(_ITERATIONS):
