@@ -19,7 +19,9 @@ DEFINITIONS_FILE = Path(__file__).with_name("message_definitions.json")
 """By type name: text and hash."""
 ENCODING = "ros2msg"
 _TYPE_NAME = re.compile(r"\w+/msg/\w+")
-_TIMES = ("std_msgs/Header", "builtin_interfaces/Time")
+_TIMES = (["std_msgs/Header"], ["builtin_interfaces/Time"])
+_CONSTANT = re.compile(r"\s*\S+\s+\w+\s*=")
+"""As `uint8 MOST=3`; a field may have a "=" too, in its type (`string<=10 name`)."""
 
 
 class Definition(NamedTuple):
@@ -33,11 +35,9 @@ class Definition(NamedTuple):
     @property
     def begins_with_time(self) -> bool:
         """Whether the first field of a message is a Time or a Header."""
-        lines = (line.split() for line in self.text.partition("=" * 80)[0].splitlines())
-        # A constant is `type NAME=value`; a bounded type has a "=" too (`string<=10 name`).
-        fields = (words for words in lines if len(words) > 1 and "=" not in words[1])
-        first = next(fields, None)
-        return first is not None and first[0] in _TIMES
+        lines = self.text.partition("=" * 80)[0].splitlines()
+        first = next((line for line in lines if line.strip() and not _CONSTANT.match(line)), "")
+        return first.split()[:1] in _TIMES
 
 
 @cache
