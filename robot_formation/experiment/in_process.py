@@ -84,8 +84,7 @@ class InProcessRun:
             RunError: if everybody waits for somebody, which no run should come to.
         """
         try:
-            with rare_collections():
-                return self._run()
+            return self._run()
         finally:
             for hosted in self._hosted:
                 hosted.component.close()
@@ -193,7 +192,9 @@ def run_in_process(
             run.recorder = Recorder(bag, metadata, options)
             stack.callback(run.recorder.close)
         try:
-            code, reason = run.run()
+            # Not where many runs follow each other: what is left of a run is little in number, but 20 MB.
+            with rare_collections():
+                code, reason = run.run()
         except (RunError, PluginError) as error:
             code, reason = exit_codes.NODE_DIED, str(error)
         except KeyboardInterrupt:
