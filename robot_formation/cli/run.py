@@ -17,6 +17,7 @@ from robot_formation.cli.parser import Subparsers
 from robot_formation.cli.picture_format import add_format
 from robot_formation.errors import FormationError
 from robot_formation.json_values import JsonObject
+from robot_formation.system.garbage import rare_collections
 
 if TYPE_CHECKING:
     from robot_formation.bag.bag_path import PathReservation
@@ -89,6 +90,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.set_defaults(run=run)
 
 
+@rare_collections()  # imports make objects, and hardly any garbage
 def run(args: argparse.Namespace) -> int:
     """Run, analyse, print; return 0 done, 3 lost or off the plate, 4 a node died, 130 interrupted.
 

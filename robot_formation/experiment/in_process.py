@@ -163,6 +163,7 @@ def progress_of(scenario: Scenario, say: Callable[[str], None]) -> Progress:
     )
 
 
+@rare_collections()  # not where many runs follow each other: what is left of a run is little in number, but 20 MB
 def run_in_process(
     scenario: Scenario,
     bag: Path | None,
@@ -192,9 +193,7 @@ def run_in_process(
             run.recorder = Recorder(bag, metadata, options)
             stack.callback(run.recorder.close)
         try:
-            # Not where many runs follow each other: what is left of a run is little in number, but 20 MB.
-            with rare_collections():
-                code, reason = run.run()
+            code, reason = run.run()
         except (RunError, PluginError) as error:
             code, reason = exit_codes.NODE_DIED, str(error)
         except KeyboardInterrupt:

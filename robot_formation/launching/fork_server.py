@@ -30,6 +30,7 @@ from robot_formation import exit_codes
 from robot_formation.errors import FormationError
 from robot_formation.experiment.run_result import RunError
 from robot_formation.launching.outcome import manner
+from robot_formation.system.garbage import rare_collections
 
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
@@ -172,11 +173,12 @@ def serve(requests: BinaryIO, answers: BinaryIO, launcher: int) -> int:
 
     Returns in the server and in each node, with the exit code.
     """
-    for name in _COMMON:
-        importlib.import_module(name)
-    from robot_formation.nodes.host.type_supports import load_type_supports
+    with rare_collections():  # imports make objects, and hardly any garbage
+        for name in _COMMON:
+            importlib.import_module(name)
+        from robot_formation.nodes.host.type_supports import load_type_supports
 
-    load_type_supports()
+        load_type_supports()
     for line in requests:
         request = json.loads(line)
         _import_own(request["executable"])

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_formation.vision.look_up import look_up
 from robot_formation.world.camera import Light, RenderedPicture
 from robot_formation.world.exposure import (
     READOUT_S,
@@ -21,7 +22,6 @@ from robot_formation.world.exposure import (
     white_balance,
 )
 from robot_formation.world.imperfections import generator
-from robot_formation.world.look_up import look_up
 from robot_formation.world.parameters import CameraParameters
 from robot_formation.world.scene import FULL
 

@@ -9,7 +9,7 @@ stray edges: Huber, Robust Statistics, 1981).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,9 +55,10 @@ _NIS_GAIN = 0.5
 """Share of the latest look in the running mean of the NIS after steps."""
 _HYPOTHESES = 50
 """Most hypotheses: more than there are first guesses."""
-_GUESS_STEP_DEG, _WIDEST_GUESS_DEG = 4, 92
+_HEADINGS_DEG = range(-92, 93, 4)
 """Headings of the first guesses: from beyond the right angle at which the Target face vanishes, close enough together
 for the update to converge from the nearest."""
+_LIKELY_FIRST = sorted(_HEADINGS_DEG, key=abs)
 _GUESS_SIGMA_M, _GUESS_SIGMA_RAD = 0.1, math.radians(3.0)
 """Standard deviations of a guess: of place, so that the first look decides it, and of heading, somewhat less than the
 guesses' distance."""
@@ -289,10 +290,10 @@ class PoseFilter:
             self._nis += _NIS_GAIN * (self.nis(boxes) - self._nis)
         branched, self._stepped = self._stepped, False
         if not self.hypotheses:
-            self.hypotheses = self._guesses(boxes)
+            self.hypotheses = list(self._guesses(boxes))
         self._take(view(boxes, self._edges), branched)
         if not self.hypotheses:
-            self.hypotheses = self._guesses(boxes)
+            self.hypotheses = list(self._guesses(boxes))
             self._take(view(boxes, self._edges))
 
     def _take(self, seen: View, branched: bool = False) -> None:
@@ -331,19 +332,17 @@ class PoseFilter:
     def whole(self, boxes: dict[Face, FaceBox]) -> bool:
         """Whether a look's boxes, at least one, fit together for some pose: not those of a partly covered marker."""
         seen = view(boxes, self._edges)
-        guesses = sorted(self._guesses(boxes), key=lambda guess: abs(guess.state[YAW]))  # the likeliest first
-        return any(self._looks.fits(guess, seen) for guess in guesses)
+        return any(self._looks.fits(guess, seen) for guess in self._guesses(boxes, _LIKELY_FIRST))
 
-    def _guesses(self, boxes: dict[Face, FaceBox]) -> list[Hypothesis]:
+    def _guesses(self, boxes: dict[Face, FaceBox], headings_deg: Sequence[int] = _HEADINGS_DEG) -> Iterator[Hypothesis]:
+        """Make a guess of each heading, when it is asked for."""
         face = Face.TARGET if Face.TARGET in boxes else max(boxes, key=lambda f: boxes[f].height)
         box = boxes[face]
-        guesses = []
-        for degrees in range(-_WIDEST_GUESS_DEG, _WIDEST_GUESS_DEG + 1, _GUESS_STEP_DEG):
+        ground = [self._p.curvature_sigma_per_m**2, self._p.saddle_sigma_per_m**2, self._p.skew_sigma_per_m**2]
+        covariance = np.diag([_GUESS_SIGMA_M**2, _GUESS_SIGMA_M**2, _GUESS_SIGMA_RAD**2, *ground])
+        for degrees in headings_deg:
             guess = self._model.place(face, box.x, box.height - self._edges.height_bias_px, math.radians(degrees))
-            ground = [self._p.curvature_sigma_per_m**2, self._p.saddle_sigma_per_m**2, self._p.skew_sigma_per_m**2]
-            covariance = np.diag([_GUESS_SIGMA_M**2, _GUESS_SIGMA_M**2, _GUESS_SIGMA_RAD**2, *ground])
-            guesses.append(Hypothesis(guess, covariance))
-        return guesses
+            yield Hypothesis(guess, covariance)
 
     def _prune(self) -> None:
         """Keep the likely hypotheses, one of each kind, the best first."""

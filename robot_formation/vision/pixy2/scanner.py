@@ -7,6 +7,7 @@ from typing import cast
 import cv2
 import numpy as np
 
+from robot_formation.vision.look_up import look_up
 from robot_formation.vision.pixy2.color_table import STRIDE, ColorTable
 from robot_formation.vision.pixy2.picture import CELLS, HEIGHT, Picture
 from robot_formation.vision.pixy2.runs import MOST_SEGMENTS, find_segments
@@ -31,7 +32,8 @@ class Scanner:
         self._red_blue = np.empty((2, HEIGHT, CELLS), np.uint16)
         # Differences are below zero, or beyond 65000 without sign.
         self._bins = self._red_blue.view(np.int16)
-        self._index = self._bins[0].ravel()
+        # Its numbers repeat, so that every 16-bit index finds what it means, without sign too.
+        self._by_index = np.tile(table.labels, (1 << 16) // len(table.labels))
         self._labels = np.empty(HEIGHT * CELLS, np.uint8)
         self._change = np.empty(HEIGHT * CELLS + 1, np.bool_)
         self._found = np.empty((4, MOST_SEGMENTS), np.intp)
@@ -57,10 +59,7 @@ class Scanner:
         np.right_shift(bins, 3, out=bins)
         np.multiply(bins[0], STRIDE, out=bins[0])
         np.add(bins[0], bins[1], out=bins[0])
-        # Numbers below zero count from the end.
-        np.bitwise_and(bins[0], STRIDE * STRIDE - 1, out=bins[0])
-        # Every index is inside the table; mode "clip" only spares numpy a copy.
-        self._table.labels.take(self._index, out=self._labels, mode="clip")
+        look_up(self._by_index, red_blue[0], out=self._labels.reshape(HEIGHT, CELLS))
 
     def _runs(self) -> IntArray:
         """First cell of each run of equal labels within a row; then the number of cells."""

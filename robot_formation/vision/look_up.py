@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+Entry = TypeVar("Entry", np.uint8, np.float32)
+
 
 def look_up(
-    table: NDArray[np.float32], picture: NDArray[np.uint16], *, out: NDArray[np.float32] | None = None
-) -> NDArray[np.float32]:
+    table: NDArray[Entry], picture: NDArray[np.uint16], *, out: NDArray[Entry] | None = None
+) -> NDArray[Entry]:
     """Entry of a table (65536,) for every value of a picture, in the picture's shape; into `out` if that is given."""
     if OPENCV_HAS_WIDE_TABLES:
-        return np.asarray(cv2.LUT(picture, table, dst=out), np.float32)
+        return np.asarray(cv2.LUT(picture, table, dst=out), table.dtype)
     return table.take(picture, out=out, mode="clip")
 
 
