@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 Entry = TypeVar("Entry", np.uint8, np.float32)
 
 
-def look_up(
-    table: NDArray[Entry], picture: NDArray[np.uint16], *, out: NDArray[Entry] | None = None
-) -> NDArray[Entry]:
+def look_up(table: NDArray[Entry], picture: NDArray[np.uint16], *, out: NDArray[Entry] | None = None) -> NDArray[Entry]:
     """Entry of a table (65536,) for every value of a picture, in the picture's shape; into `out` if that is given."""
     if OPENCV_HAS_WIDE_TABLES:
         return np.asarray(cv2.LUT(picture, table, dst=out), table.dtype)
