@@ -18,7 +18,7 @@ from typing import Any
 from comparison import Comparison, add_comparisons, as_json
 from robot_formation.experiment import sweep, sweep_runs
 
-AIM = 60.0
+AIM = 240.0
 JOBS = (1, 2)
 
 
