@@ -28,15 +28,14 @@ START_AIM_S, END_AIM_S, IN_PROCESS_AIM_S, MEMORY_AIM_MB = 1.5, 0.3, 1.3, 350.0
 IN_PROCESS = """
 import resource, sys, time
 from pathlib import Path
-from robot_formation.system.garbage import rare_collections, skip_last_collection
-with rare_collections():  # and that at the end: as the command does
+from robot_formation.system.garbage import rare_collections
+with rare_collections():  # as `formation run` does
     from robot_formation.experiment import scenario as scenarios
     from robot_formation.experiment.in_process import run_in_process
     from robot_formation.launching.processes import run_metadata
     scenario = scenarios.override(scenarios.load_track("two"), sys.argv[2:])
     result = run_in_process(scenario, Path(sys.argv[1]), run_metadata(scenario))
 print(result.running_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
-skip_last_collection()
 sys.exit(result.exit_code)
 """
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 
 from robot_formation.cli.interrupts import Interrupts, guard_streams
-from robot_formation.system.garbage import skip_last_collection
 
 
 def main() -> int:
@@ -27,7 +26,6 @@ def main() -> int:
         print("formation: interrupted", file=sys.stderr)
         code = 130
     interrupts.leave(code)
-    skip_last_collection()
     return code
 
 

@@ -23,12 +23,3 @@ def rare_collections() -> Iterator[None]:
         yield
     finally:
         gc.set_threshold(*before)
-
-
-def skip_last_collection() -> None:
-    """Leave garbage in cycles alone when this process ends; for processes of the project's own commands.
-
-    Python's end looks at all objects of the process several times, which takes 35 ms where those libraries are loaded,
-    and frees what goes with the process anyway. Files that are open then and lie in a cycle would not be flushed.
-    """
-    gc.freeze()

@@ -9,10 +9,12 @@ from pathlib import Path
 from repository import ROOT
 
 FAILING = """
+log = open("log.txt", "w")
 class Failing:
     count = 0
     def observe(self, displacement):
         self.count += 1
+        print(self.count, file=log)
     def forecast(self):
         return [0.0, 0.05 / (3 - self.count)]
 """
@@ -38,6 +40,7 @@ def test_the_run_ends_as_if_its_node_had_died_in_process_and_over_the_graph(tmp_
     assert (found["outcome"], found["reason"]) == ("incomplete", REASON)
     assert isinstance(found["timesteps"], list)
     assert len(found["timesteps"]) == 3
+    assert (tmp_path / "log.txt").read_text().split() == ["1", "2", "3"]  # never closed: Python's end writes it
     graph_said, graph_found = run(tmp_path, "graph")
     assert graph_found["timesteps"] == found["timesteps"]
     assert REASON in str(graph_found["reason"])

@@ -4,7 +4,7 @@ import gc
 
 import pytest
 
-from robot_formation.system.garbage import rare_collections, skip_last_collection
+from robot_formation.system.garbage import rare_collections
 
 
 def test_collections_are_rare_meanwhile_and_as_before_afterwards() -> None:
@@ -23,12 +23,3 @@ def test_who_collects_still_more_seldom_is_left_alone(chosen: int) -> None:
             assert gc.get_threshold()[0] == chosen
     finally:
         gc.set_threshold(*before)
-
-
-def test_who_ends_has_nothing_left_to_collect() -> None:
-    try:
-        skip_last_collection()
-        assert gc.get_freeze_count() > 0
-        assert gc.collect() == 0
-    finally:
-        gc.unfreeze()

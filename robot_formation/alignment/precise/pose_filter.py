@@ -59,6 +59,7 @@ _HEADINGS_DEG = range(-92, 93, 4)
 """Headings of the first guesses: from beyond the right angle at which the Target face vanishes, close enough together
 for the update to converge from the nearest."""
 _LIKELY_FIRST = sorted(_HEADINGS_DEG, key=abs)
+"""The same headings in another order: a neighbour mostly heads as the follower does."""
 _GUESS_SIGMA_M, _GUESS_SIGMA_RAD = 0.1, math.radians(3.0)
 """Standard deviations of a guess: of place, so that the first look decides it, and of heading, somewhat less than the
 guesses' distance."""
