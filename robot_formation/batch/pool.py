@@ -9,6 +9,8 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
+from robot_formation.system.threads import use_one_thread
+
 T = TypeVar("T")
 _MANAGER = "ExecutorManagerThread"
 _ENDS_S = 5.0
@@ -26,7 +28,7 @@ def run_parallel(function: Callable[..., T], arguments: Iterable[tuple[object, .
     # One task in a worker at a time; a few wait, so that no worker idles.
     pool = Parallel(n_jobs=jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
     with _quiet_manager():
-        with _without_interrupts(), _quiet_tracker():  # the workers start here, and inherit both
+        with _without_interrupts(), _worker_environment():  # the workers start here, and inherit both
             results = pool(delayed(_uninterrupted)(jobs > 1, function, entry) for entry in arguments)
         yield from results
 
@@ -55,20 +57,22 @@ def _without_interrupts() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _quiet_tracker() -> Iterator[None]:
-    """Let processes be started that don't print warnings of loky's resource tracker.
+def _worker_environment() -> Iterator[None]:
+    """Let processes be started that work in one thread each, and don't print warnings of loky's resource tracker.
 
-    It is a process of its own, which after an interrupt may want to remove what the pool has removed already.
+    The tracker is a process of its own, which after an interrupt may want to remove what the pool has removed already.
     """
-    name, before = "PYTHONWARNINGS", os.environ.get("PYTHONWARNINGS")
-    os.environ[name] = ",".join(filter(None, (before, "ignore:resource_tracker:UserWarning")))
+    before = dict(os.environ)
+    warnings = ",".join(filter(None, (before.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning")))
+    wanted = {**before, "PYTHONWARNINGS": warnings}
+    use_one_thread(wanted)
+    os.environ.update(wanted)
     try:
         yield
     finally:
-        if before is None:
+        for name in wanted.keys() - before.keys():
             del os.environ[name]
-        else:
-            os.environ[name] = before
+        os.environ.update(before)
 
 
 @contextlib.contextmanager

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from robot_formation.cli.interrupts import Interrupts, guard_streams
+from robot_formation.system.threads import use_one_thread
 
 
 def main() -> int:
@@ -13,6 +15,7 @@ def main() -> int:
     try:
         interrupts.install()
         guard_streams()
+        use_one_thread(os.environ)
         from robot_formation.cli import main as command_line
 
         code = command_line.main()

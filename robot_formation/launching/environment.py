@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from robot_formation.network.loopback import BEYOND, MANY_NODES, RANGE, use_loopback, use_profile_for_many
+from robot_formation.system.threads import use_one_thread
 
 
 def joining(domain: int) -> str:
@@ -40,7 +41,5 @@ def node_environment(domain: int, folder: Path, nodes: int = 1) -> dict[str, str
     use_loopback(environment)
     if nodes >= MANY_NODES:
         use_profile_for_many(environment, folder, nodes)
-    # Many small processes on few cores: a pool of threads for linear algebra in each would only get in the way.
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        environment.setdefault(name, "1")
+    use_one_thread(environment)
     return environment
