@@ -26,13 +26,16 @@ from robot_formation.analysis.from_bag import load_run
 AIMS = {"stream": 10.0, "on_demand": 20.0}
 START_AIM_S, END_AIM_S, IN_PROCESS_AIM_S, MEMORY_AIM_MB = 1.5, 0.3, 1.3, 350.0
 IN_PROCESS = """
-import resource, sys, time
+import gc, os, resource, sys, time
 from pathlib import Path
 from robot_formation.system.garbage import rare_collections
-with rare_collections():  # as `formation run` does
+from robot_formation.system.threads import use_one_thread
+use_one_thread(os.environ)  # as `formation run` does; also what follows about garbage
+with rare_collections():
     from robot_formation.experiment import scenario as scenarios
     from robot_formation.experiment.in_process import run_in_process
     from robot_formation.launching.processes import run_metadata
+    gc.freeze()
     scenario = scenarios.override(scenarios.load_track("two"), sys.argv[2:])
     result = run_in_process(scenario, Path(sys.argv[1]), run_metadata(scenario))
 print(result.running_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)

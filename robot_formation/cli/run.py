@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import re
 import sys
@@ -104,6 +105,11 @@ def run(args: argparse.Namespace) -> int:
 
     tracing = TracingFiles()  # before anything of ROS is loaded
     try:
+        import_everything(args.in_process)
+        if args.own_process:
+            # Collections, the one at Python's end above all, needn't look at what is imported. What is loaded from here
+            # on may be the user's, and is collected.
+            gc.freeze()
         scenario = build_scenario(args)
         check_stand_ins(args, scenario)
         require("ros", *(() if WORLD_NODE in args.without else ("sim",)))
@@ -139,6 +145,20 @@ def run(args: argparse.Namespace) -> int:
     elif result.bag is not None:
         print(f"bag: {result.bag}")
     return result.exit_code
+
+
+def import_everything(in_process: bool) -> None:
+    """Import what a run needs of this package.
+
+    Raises:
+        FormationError: ROS or the simulator isn't installed.
+    """
+    from robot_formation.experiment import scenario as _scenario  # noqa: F401
+    from robot_formation.extras import require
+
+    if in_process:
+        require("ros", "sim")
+        from robot_formation.experiment import in_process as _in_process  # noqa: F401
 
 
 def build_scenario(args: argparse.Namespace) -> Scenario:

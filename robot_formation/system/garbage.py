@@ -6,12 +6,12 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_NEW_OBJECTS = 50_000
+_NEW_OBJECTS = 200_000
 
 
 @contextmanager
 def rare_collections() -> Iterator[None]:
-    """Collect seldom in this process: after 50 000 new objects, not 700, or as seldom as the caller has chosen.
+    """Collect seldom in this process: after 200 000 new objects, not 700, or as seldom as the caller has chosen.
 
     For work that makes hardly any garbage in cycles: each full collection looks at all objects of the process, which
     takes 12 ms where numpy, OpenCV and the message packages are loaded.
