@@ -76,15 +76,17 @@ class LookUpdate:
             return
         measured = np.array([edge.position_px for edge in edges])
         sigmas = np.array([edge.sigma_px for edge in edges])
+        squares, limits = sigmas**2, _STRAY_SIGMAS * sigmas
         prior, covariance = hypothesis.state, hypothesis.covariance
         state = prior
         for number in range(_ITERATIONS):
             h, predicted = self._linearise(state, edges)
             # Huber's weights: an edge that contradicts the others, as of a broken block, pulls with limited force.
-            strays = np.maximum(1.0, np.abs(measured - predicted) / (_STRAY_SIGMAS * sigmas)) if number else 1.0
-            variance = sigmas**2 * strays
-            scatter = _plus_diagonal(h @ covariance @ h.T, variance)
-            gain = np.linalg.solve(scatter, h @ covariance).T
+            strays = np.maximum(1.0, np.abs(measured - predicted) / limits) if number else 1.0
+            variance = squares * strays
+            shared = h @ covariance
+            scatter = _plus_diagonal(shared @ h.T, variance)
+            gain = np.linalg.solve(scatter, shared).T
             change = prior + gain @ (measured - predicted - h @ (prior - state)) - state
             change[YAW] = max(-_LARGEST_CHANGE_RAD, min(_LARGEST_CHANGE_RAD, change[YAW]))
             state = state + change
