@@ -48,6 +48,8 @@ class Interrupts:
     def leave(self, code: int) -> None:
         """From now on a signal ends the process at once with this exit code: only Python's own end is left to do."""
         self._leaving = code
+        # An interrupt that was to be raised again: Python's end lets go of the handlers, and SIGALRM would kill.
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
     def _take(self, number: int, frame: FrameType | None) -> None:
         if self._leaving is not None:
@@ -62,6 +64,8 @@ class Interrupts:
     def _unraisable(self, unraisable: Any) -> None:
         """Raise an interrupt again that hit where Python can't raise: in a destructor or a callback of C code."""
         if self.came and isinstance(unraisable.exc_value, KeyboardInterrupt):
+            if self._leaving is not None:
+                return
             # A moment later, since nothing can be raised in here either.
             signal.signal(signal.SIGALRM, _raise)
             signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)

@@ -100,6 +100,26 @@ except KeyboardInterrupt:
     assert (completed.returncode, completed.stderr) == (0, "")
 
 
+def test_an_interrupt_in_a_destructor_does_not_kill_a_process_that_ends() -> None:
+    code = """
+import signal
+from robot_formation.cli.interrupts import Interrupts
+interrupts = Interrupts()
+interrupts.install()
+class Last:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+thing = Last()
+del thing
+assert signal.getitimer(signal.ITIMER_REAL)[0] > 0.0
+interrupts.leave(0)
+signal.signal(signal.SIGALRM, signal.SIG_DFL)  # as Python's end does
+print(signal.getitimer(signal.ITIMER_REAL))
+"""
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (completed.returncode, completed.stdout, completed.stderr) == (0, "(0.0, 0.0)\n", "")
+
+
 @pytest.mark.parametrize("closed", ["1", *(pytest.param(n, marks=pytest.mark.long) for n in ("2", "12")), "012"])
 def test_closed_streams_leave_the_exit_code_and_the_bag_alone(tmp_path: Path, closed: str) -> None:
     bag = tmp_path / "bag"
