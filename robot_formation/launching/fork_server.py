@@ -13,6 +13,7 @@ import ctypes
 import gc
 import importlib
 import inspect
+import io
 import json
 import os
 import select
@@ -238,6 +239,16 @@ def _node(*, executable: str, arguments: list[str], log: str, farewell: bool, la
     return int(getattr(executables, executable)())
 
 
+def _flush_files() -> None:
+    """Write what open files still hold, as Python's end does: a class from outside may have left one open."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    for thing in gc.get_objects():  # without what was imported before the fork, which is frozen
+        if issubclass(type(thing), io.IOBase):
+            with contextlib.suppress(Exception):  # closed, or a class from outside again
+                thing.flush()
+
+
 if __name__ == "__main__":
     # Requests and answers get descriptors of their own: what a library prints goes to the log.
     pipes = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
@@ -245,6 +256,5 @@ if __name__ == "__main__":
     die_with(int(sys.argv[1]))
     code = serve(*pipes, int(sys.argv[1]))
     # Taking the interpreter down would write to all that is shared, and free nothing that outlasts a process.
-    sys.stdout.flush()
-    sys.stderr.flush()
+    _flush_files()
     os._exit(code)

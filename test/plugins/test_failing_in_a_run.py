@@ -41,7 +41,9 @@ def test_the_run_ends_as_if_its_node_had_died_in_process_and_over_the_graph(tmp_
     assert isinstance(found["timesteps"], list)
     assert len(found["timesteps"]) == 3
     assert (tmp_path / "log.txt").read_text().split() == ["1", "2", "3"]  # never closed: Python's end writes it
+    (tmp_path / "log.txt").unlink()
     graph_said, graph_found = run(tmp_path, "graph")
+    assert (tmp_path / "log.txt").read_text().split() == ["1", "2", "3"]
     assert graph_found["timesteps"] == found["timesteps"]
     assert REASON in str(graph_found["reason"])
     assert graph_said.count("ZeroDivisionError") == 1, graph_said
