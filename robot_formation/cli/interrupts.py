@@ -64,17 +64,15 @@ class Interrupts:
     def _unraisable(self, unraisable: Any) -> None:
         """Raise an interrupt again that hit where Python can't raise: in a destructor or a callback of C code."""
         if self.came and isinstance(unraisable.exc_value, KeyboardInterrupt):
-            if self._leaving is not None:
-                return
             # A moment later, since nothing can be raised in here either.
-            signal.signal(signal.SIGALRM, _raise)
+            signal.signal(signal.SIGALRM, self._raise_again)
             signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
         else:
             sys.__unraisablehook__(unraisable)
 
-
-def _raise(number: int, frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
+    def _raise_again(self, number: int, frame: FrameType | None) -> None:
+        if self._leaving is None:
+            raise KeyboardInterrupt
 
 
 class _Stream(io.FileIO):
