@@ -39,6 +39,8 @@ _PR_GET_CHILD_SUBREAPER = 37
 _ADOPTION_S = 5.0
 _END_S = 5.0
 _POLL_S = 0.1
+_FILE = io.IOBase.__base__ or io.IOBase
+"""Base of all open files without the hooks of an abstract class, which may fail at classes from outside."""
 _COMMON = ("robot_formation.nodes.executables", "robot_formation.nodes.host.component_node")
 """Modules that all nodes need; what only some need is imported before the first of these is forked."""
 _RECORDER = "robot_formation.nodes.recorder.recorder_node"
@@ -232,20 +234,25 @@ def _node(*, executable: str, arguments: list[str], log: str, farewell: bool, la
     setproctitle.setproctitle(" ".join(["robot_formation", *sys.argv]))
     die_with(launcher)
     from robot_formation.nodes import executables
-    from robot_formation.nodes.host.signals import end_without_farewell
+    from robot_formation.nodes.host.signals import bounded_end, end_without_farewell
 
     if not farewell:
         end_without_farewell(launcher)
-    return int(getattr(executables, executable)())
+    code = int(getattr(executables, executable)())
+    with bounded_end():  # a pipe that nobody reads takes no more
+        _flush_files()
+    return code
 
 
 def _flush_files() -> None:
-    """Write what open files still hold, as Python's end does: a class from outside may have left one open."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    for thing in gc.get_objects():  # without what was imported before the fork, which is frozen
-        if issubclass(type(thing), io.IOBase):
-            with contextlib.suppress(Exception):  # closed, or a class from outside again
+    """Write what open files still hold: this process leaves without Python's end, which would close them.
+
+    A class from outside may have left a file open. Compressed ones stay without their end.
+    """
+    # What was imported before the fork is frozen, and not among these objects.
+    for thing in gc.get_objects():
+        if issubclass(type(thing), _FILE):
+            with contextlib.suppress(Exception, SystemExit):  # closed, a full disk, or a class from outside again
                 thing.flush()
 
 
@@ -256,5 +263,6 @@ if __name__ == "__main__":
     die_with(int(sys.argv[1]))
     code = serve(*pipes, int(sys.argv[1]))
     # Taking the interpreter down would write to all that is shared, and free nothing that outlasts a process.
-    _flush_files()
+    sys.stdout.flush()
+    sys.stderr.flush()
     os._exit(code)
