@@ -29,8 +29,8 @@ IN_PROCESS = """
 import gc, os, resource, sys, time
 from pathlib import Path
 from robot_formation.system.garbage import rare_collections
-from robot_formation.system.threads import use_one_thread
-use_one_thread(os.environ)  # as `formation run` does; also what follows about garbage
+from robot_formation.system.threads import one_thread
+os.environ.update(one_thread(os.environ))  # as `formation run` does, which also has the two lines about garbage
 with rare_collections():
     from robot_formation.experiment import scenario as scenarios
     from robot_formation.experiment.in_process import run_in_process

@@ -9,7 +9,8 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
-from robot_formation.system.threads import use_one_thread
+from robot_formation.system.threads import one_thread
+from robot_formation.system.variables import set_for_a_while
 
 T = TypeVar("T")
 _MANAGER = "ExecutorManagerThread"
@@ -28,7 +29,7 @@ def run_parallel(function: Callable[..., T], arguments: Iterable[tuple[object, .
     # One task in a worker at a time; a few wait, so that no worker idles.
     pool = Parallel(n_jobs=jobs, return_as="generator", batch_size=1, pre_dispatch="3*n_jobs")
     with _quiet_manager():
-        with _without_interrupts(), _worker_environment():  # the workers start here, and inherit both
+        with _without_interrupts(), set_for_a_while(_worker_environment()):  # the workers start here, and inherit both
             results = pool(delayed(_uninterrupted)(jobs > 1, function, entry) for entry in arguments)
         yield from results
 
@@ -56,23 +57,13 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
-@contextlib.contextmanager
-def _worker_environment() -> Iterator[None]:
-    """Let processes be started that work in one thread each, and don't print warnings of loky's resource tracker.
+def _worker_environment() -> dict[str, str]:
+    """Return variables for processes that work in one thread each, and don't print warnings of loky's resource tracker.
 
     The tracker is a process of its own, which after an interrupt may want to remove what the pool has removed already.
     """
-    before = dict(os.environ)
-    warnings = ",".join(filter(None, (before.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning")))
-    wanted = {**before, "PYTHONWARNINGS": warnings}
-    use_one_thread(wanted)
-    os.environ.update(wanted)
-    try:
-        yield
-    finally:
-        for name in wanted.keys() - before.keys():
-            del os.environ[name]
-        os.environ.update(before)
+    warnings = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker:UserWarning")))
+    return {**one_thread(os.environ), "PYTHONWARNINGS": warnings}
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ import os
 import sys
 
 from robot_formation.cli.interrupts import Interrupts, guard_streams
-from robot_formation.system.threads import use_one_thread
+from robot_formation.system.threads import one_thread
 
 
 def main() -> int:
@@ -15,7 +15,7 @@ def main() -> int:
     try:
         interrupts.install()
         guard_streams()
-        use_one_thread(os.environ)
+        os.environ.update(one_thread(os.environ))
         from robot_formation.cli import main as command_line
 
         code = command_line.main()

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from robot_formation.network.loopback import BEYOND, MANY_NODES, RANGE, use_loopback, use_profile_for_many
-from robot_formation.system.threads import use_one_thread
+from robot_formation.system.threads import one_thread
 
 
 def joining(domain: int) -> str:
@@ -41,5 +41,5 @@ def node_environment(domain: int, folder: Path, nodes: int = 1) -> dict[str, str
     use_loopback(environment)
     if nodes >= MANY_NODES:
         use_profile_for_many(environment, folder, nodes)
-    use_one_thread(environment)
+    environment.update(one_thread(environment))
     return environment

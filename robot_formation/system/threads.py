@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableMapping
+from collections.abc import Mapping
 
-_COUNTS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
+_OPENMP = "OMP_NUM_THREADS"
+_OTHERS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 
 
-def use_one_thread(environment: MutableMapping[str, str]) -> None:
-    """Let such libraries work in the thread that calls them, unless the user has chosen a number of threads.
+def one_thread(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the variables with which such libraries work in the thread that calls them.
 
     Our matrices and pictures are small: threads for them cost a short run a twentieth of its time, and other processes
-    of the graph or of a sweep the processor that they run on. Takes effect in a process that hasn't imported numpy and
-    OpenCV, and in those that it starts.
+    of the graph or of a sweep the processor that they run on. The user's choice counts: that of OMP_NUM_THREADS for all
+    libraries, that of a library's own variable for this one.
 
     Args:
-        environment: of the process.
+        environment: in which the user may have chosen. The process must not have imported numpy and OpenCV.
     """
-    for name in _COUNTS:
-        environment.setdefault(name, "1")
+    count = environment.get(_OPENMP, "1")
+    return {_OPENMP: count, **{name: environment.get(name, count) for name in _OTHERS}}

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
-import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from types import TracebackType
 
@@ -21,31 +19,13 @@ from robot_formation.network.loopback import BEYOND, PROFILES, RANGE
 from robot_formation.nodes.host.executor import make_executor
 from robot_formation.nodes.host.living_nodes import node_names
 from robot_formation.nodes.host.qos import qos_profile
+from robot_formation.system.variables import set_for_a_while
 
 # Nodes whose names begin with an underscore are hidden: nobody waits for them, and lists leave them out.
 _NAME = "_monitor"
 _QUIET_ROUNDS, _MOST_ROUNDS = 3, 60
 # What a process must have in common with the run's nodes to find them at once, and where rclpy writes its log.
 _JOINING = (*PROFILES, RANGE, *BEYOND, "ROS_LOG_DIR")
-
-
-@contextlib.contextmanager
-def _variables(values: Mapping[str, str | None]) -> Iterator[None]:
-    """Set or (None) unset environment variables for a while: rclpy reads its settings from nowhere else."""
-    before = {name: os.environ.get(name) for name in values}
-    _set(values)
-    try:
-        yield
-    finally:
-        _set(before)
-
-
-def _set(values: Mapping[str, str | None]) -> None:
-    for name, value in values.items():
-        if value is None:
-            os.environ.pop(name, None)
-        else:
-            os.environ[name] = value
 
 
 def topic_of(name: str) -> names.Topic:
@@ -74,7 +54,7 @@ class Monitor:
             listen: called with topic and message.
         """
         self._context = Context()
-        with _variables({name: environment.get(name) for name in _JOINING}):
+        with set_for_a_while({name: environment.get(name) for name in _JOINING}):
             domain = int(environment["ROS_DOMAIN_ID"])
             rclpy.init(context=self._context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
             # Here too: the middleware reads its settings when the first node is made.
