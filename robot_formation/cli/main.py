@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         offer_names(parser)
         argcomplete.autocomplete(parser, always_complete_options=False)
     args = parser.parse_args(arguments)
-    args.own_process = arguments is None  # a program that calls this function gives arguments, and has other objects
+    args.own_process = arguments is None  # other programs that call this function are expected to give arguments
     try:
         code: int = args.run(args)
         sys.stdout.flush()

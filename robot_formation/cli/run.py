@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import importlib
 import json
 import re
 import sys
@@ -105,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
 
     tracing = TracingFiles()  # before anything of ROS is loaded
     try:
-        import_everything(args.in_process)
+        import_before_the_users(args.in_process)
         if args.own_process:
             # Collections, the one at Python's end above all, needn't look at what is imported. What is loaded from here
             # on may be the user's, and is collected.
@@ -147,18 +148,18 @@ def run(args: argparse.Namespace) -> int:
     return result.exit_code
 
 
-def import_everything(in_process: bool) -> None:
-    """Import what a run needs of this package.
+def import_before_the_users(in_process: bool) -> None:
+    """Import what is large and the package's own, before a class of the user's is loaded.
 
     Raises:
-        FormationError: ROS or the simulator isn't installed.
+        FormationError: ROS or the simulator isn't installed, or shared memory is full.
     """
-    from robot_formation.experiment import scenario as _scenario  # noqa: F401
     from robot_formation.extras import require
 
+    importlib.import_module("robot_formation.experiment.scenario")
     if in_process:
         require("ros", "sim")
-        from robot_formation.experiment import in_process as _in_process  # noqa: F401
+        importlib.import_module("robot_formation.experiment.in_process")
 
 
 def build_scenario(args: argparse.Namespace) -> Scenario:
