@@ -77,8 +77,8 @@ class LeaderComponent(Component):
         every = -(-len(planned) // MOST_PLANNED)
         # The last pose belongs to it, whichever are left out.
         shown = [*planned[:-1:every], planned[-1]]
-        messages = [conversions.move(pose, frame, self.stamp_ns) for pose in shown]
-        self._send(names.PLAN, conversions.path(messages, frame, self.stamp_ns))
+        plan = [conversions.planar_path_pose(pose, frame, self.stamp_ns) for pose in shown]
+        self._send(names.PLAN, conversions.path(plan, frame, self.stamp_ns))
 
     def _driven_motion(self, timestep: int) -> Motion | None:
         return None if self._driven is None else self._driven.motion(self._now_s())

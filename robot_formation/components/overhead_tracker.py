@@ -22,7 +22,7 @@ class OverheadTrackerComponent(Component):
         super().__init__(place)
         self._tracker = OverheadTracker(parameters, parameters.make_surface(), parameters.starts())
         self._path_topics = {robot: names.overhead_path(robot) for robot in parameters.robots}
-        self._trails: dict[str, Trail[Message]] = {robot: Trail() for robot in parameters.robots}
+        self._trails: dict[str, Trail[conversions.PathPose]] = {robot: Trail() for robot in parameters.robots}
         self._pictures = 0
         self._unseen: list[str] = []
 
@@ -69,6 +69,7 @@ class OverheadTrackerComponent(Component):
         }
         self._send(names.OVERHEAD_POSES, conversions.pose_array(list(poses.values()), frame, stamp_ns))
         for robot in found:
-            path = self._trails[robot].add(self._tracker.tracks[robot].place.tolist(), poses[robot])
+            place = self._tracker.tracks[robot].place.tolist()
+            path = self._trails[robot].add(place, conversions.path_pose(place, frame, stamp_ns))
             if path is not None:
                 self._send(self._path_topics[robot], conversions.path(path, frame, stamp_ns))

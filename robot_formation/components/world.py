@@ -67,7 +67,7 @@ class WorldComponent(Component):
         self._parameters = parameters
         self._moving: set[str] = set()
         self._numbers = dict.fromkeys(parameters.robots, "")  # of each robot's last command, echoed to its drive
-        self._trails: dict[str, Trail[Message]] = {name: Trail() for name in parameters.robots}
+        self._trails: dict[str, Trail[conversions.PathPose]] = {name: Trail() for name in parameters.robots}
         self._overhead = OverheadView(surface, parameters, parameters.seed)
         self.stamp_ns = start_ns
         self._awaited = AwaitedRobots(parameters.schedule, parameters.robots, parameters.timesteps, parameters.period_s)
@@ -366,8 +366,8 @@ class WorldComponent(Component):
         )
         self._send(odom, odometry)
         if event.final:
-            pose = conversions.pose(place, orientation, names.WORLD_FRAME, event.stamp_ns)
-            self._send(pose_topic, pose)
+            self._send(pose_topic, conversions.pose(place, orientation, names.WORLD_FRAME, event.stamp_ns))
+            pose = conversions.path_pose(place, names.WORLD_FRAME, event.stamp_ns, orientation)
             path = self._trails[robot].add(place, pose)
             if path is not None:
                 self._send(path_topic, conversions.path(path, names.WORLD_FRAME, event.stamp_ns))

@@ -6,10 +6,11 @@ import math
 import struct
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import Pose, PoseArray, PoseStamped, PoseWithCovarianceStamped, Twist
-from nav_msgs.msg import Odometry, Path
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
 
 from robot_formation.conversions.basics import stamped
@@ -17,14 +18,14 @@ from robot_formation.drive.movement_system import WheelCommand
 from robot_formation.errors import MessageError
 from robot_formation.geometry.se2 import Motion
 from robot_formation.names import JOINTS, WHEELS
-from robot_formation.system.cdr import HEAD, add_text, gap
+from robot_formation.system.cdr import HEAD, add_numbers, add_text, gap
 
 _LARGEST_WHEEL_ANGLE_RAD = 1e4
 _PLANAR = [6 * row + column for row in (0, 1, 5) for column in (0, 1, 5)]
 """Where the covariance of (x, y, yaw) lies in a pose's (6, 6), row by row."""
 _PLACE = [6 * row + column for row in (0, 1) for column in (0, 1)]
 """Where that of (x, y) lies."""
-_STAMP, _POSE, _TWIST = struct.Struct("<iI"), struct.Struct("<7d"), struct.Struct("<6d")
+_STAMP, _COUNT, _POSE, _TWIST = (struct.Struct(f"<{kind}") for kind in ("iI", "I", "7d", "6d"))
 _NO_COVARIANCE = bytes(36 * 8)
 
 
@@ -229,6 +230,41 @@ def pose_array(poses: Sequence[PoseStamped], frame: str, stamp_ns: int) -> PoseA
     return stamped(PoseArray, stamp_ns, frame, poses=[each.pose for each in poses])
 
 
-def path(poses: Sequence[PoseStamped], frame: str, stamp_ns: int) -> Path:
-    """Make a path."""
-    return stamped(Path, stamp_ns, frame, poses=list(poses))
+class PathPose(NamedTuple):
+    """A pose of a path, serialised: its time and frame, and its seven numbers."""
+
+    head: bytes
+    numbers: bytes
+
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+"""Orientation (x, y, z, w) of a frame that is not turned."""
+
+
+def path_pose(
+    position: Sequence[float], frame: str, stamp_ns: int, quaternion_xyzw: Sequence[float] = UPRIGHT
+) -> PathPose:
+    """Make a pose of a path."""
+    cdr = bytearray(HEAD + _STAMP.pack(*divmod(stamp_ns, 10**9)))
+    add_text(cdr, frame)
+    return PathPose(bytes(cdr[len(HEAD) :]), _POSE.pack(*position, *quaternion_xyzw))
+
+
+def planar_path_pose(motion: Motion, frame: str, stamp_ns: int) -> PathPose:
+    """Make a pose of a path in a plane."""
+    turn = (0.0, 0.0, math.sin(motion.yaw_rad / 2.0), math.cos(motion.yaw_rad / 2.0))
+    return path_pose((motion.x_m, motion.y_m, 0.0), frame, stamp_ns, turn)
+
+
+def path(poses: Sequence[PathPose], frame: str, stamp_ns: int) -> bytes:
+    """Make a Path message, serialised.
+
+    A path that grows is sent again and again. By way of rclpy's classes each of its poses would be serialised anew.
+    """
+    cdr = bytearray(HEAD + _STAMP.pack(*divmod(stamp_ns, 10**9)))
+    add_text(cdr, frame)
+    add_numbers(cdr, 4, _COUNT.pack(len(poses)))
+    for pose in poses:
+        add_numbers(cdr, 4, pose.head)
+        add_numbers(cdr, 8, pose.numbers)
+    return bytes(cdr)

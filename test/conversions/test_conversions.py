@@ -11,7 +11,7 @@ from geometry_msgs.msg import Point
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import Odometry, Path
 from numpy.typing import NDArray
 from sensor_msgs.msg import Image, JointState, PointField
 from std_msgs.msg import ColorRGBA
@@ -278,9 +278,30 @@ def test_odometry_has_its_frames_pose_and_velocities_in_their_fields() -> None:
     assert not any([*message.pose.covariance, *message.twist.covariance])
     pose = conversions.pose((1, 2, 3), (0, 0, 0, 1), "world", 5 * 10**9 + 7)
     assert (pose.header, pose.pose) == (message.header, message.pose.pose)
-    assert conversions.path([pose, pose], "world", 7).poses == [pose, pose]
     planar = conversions.odometry(Motion(1.0, 2.0, 0.5), "leader/odom", "leader/base_link", 3)
     close(conversions.read_pose(planar.pose.pose), Motion(1.0, 2.0, 0.5))
+
+
+names_of_frames = st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=12)
+poses_of_a_path = st.tuples(stamps, names_of_frames, st.lists(st.floats(allow_nan=False), min_size=7, max_size=7))
+
+
+@given(poses=st.lists(poses_of_a_path, max_size=4), frame=names_of_frames, stamp=stamps)
+def test_a_path_is_serialised_as_by_rclpy_but_for_the_bytes_that_align_numbers(
+    poses: list[tuple[int, str, list[float]]], frame: str, stamp: int
+) -> None:
+    made = [conversions.path_pose(p[:3], of, at, p[3:]) for at, of, p in poses]
+    messages = [conversions.pose(p[:3], p[3:], of, at) for at, of, p in poses]
+    whole = Path(header=conversions.header(stamp, frame), poses=messages)
+    cdr = conversions.path(made, frame, stamp)
+    assert conversions.from_cdr(cdr, "nav_msgs/msg/Path") == whole
+    assert len(cdr) == len(conversions.to_cdr(whole))
+
+
+def test_a_planar_pose_of_a_path_is_that_of_a_move() -> None:
+    motion = Motion(1.0, -2.0, 0.5)
+    path = conversions.path([conversions.planar_path_pose(motion, "odom", 5)], "odom", 7)
+    assert conversions.from_cdr(path, "nav_msgs/msg/Path").poses == [conversions.move(motion, "odom", 5)]
 
 
 # --- pictures ---------------------------------------------------------------------------------------------------------
