@@ -27,6 +27,8 @@ _PLACE = [6 * row + column for row in (0, 1) for column in (0, 1)]
 """Where that of (x, y) lies."""
 _STAMP, _COUNT, _POSE, _TWIST = (struct.Struct(f"<{kind}") for kind in ("iI", "I", "7d", "6d"))
 _NO_COVARIANCE = bytes(36 * 8)
+_IDENTITY = (0.0, 0.0, 0.0, 1.0)
+"""Orientation (x, y, z, w) of what is not turned."""
 
 
 def joint_command(command: WheelCommand, stamp_ns: int) -> JointState:
@@ -237,12 +239,8 @@ class PathPose(NamedTuple):
     numbers: bytes
 
 
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-"""Orientation (x, y, z, w) of a frame that is not turned."""
-
-
 def path_pose(
-    position: Sequence[float], frame: str, stamp_ns: int, quaternion_xyzw: Sequence[float] = UPRIGHT
+    position: Sequence[float], frame: str, stamp_ns: int, quaternion_xyzw: Sequence[float] = _IDENTITY
 ) -> PathPose:
     """Make a pose of a path."""
     cdr = bytearray(HEAD + _STAMP.pack(*divmod(stamp_ns, 10**9)))
