@@ -54,10 +54,13 @@ class Qos:
 
 
 EVENT = Qos()
-# Transient local: late subscribers get the whole history.
+# Transient local: late subscribers get the whole history, or what is left of it.
 HISTORY = Qos(durability="transient_local")
 LATCHED = Qos(durability="transient_local", history="keep_last", depth=1)
-CLOCK = Qos(history="keep_last", depth=100)
+# For paths, each of which replaces the one before. Of one alone a busy recorder would miss some.
+GROWING = Qos(durability="transient_local", history="keep_last", depth=10)
+# So many instants of a fast run take a second of wall time.
+CLOCK = Qos(history="keep_last", depth=1000)
 STATUS = Qos(history="keep_last", depth=10)
 
 
@@ -162,7 +165,7 @@ def ground_truth_pose(robot: str) -> Topic:
 
 def ground_truth_path(robot: str) -> Topic:
     """True path of base_link at rest, for viewers."""
-    return Topic(f"ground_truth/{robot}/path", "nav_msgs/msg/Path", LATCHED)
+    return Topic(f"ground_truth/{robot}/path", "nav_msgs/msg/Path", GROWING)
 
 
 def left_plate() -> Topic:
@@ -177,7 +180,7 @@ def robot_description(robot: str) -> Topic:
 
 def overhead_path(robot: str) -> Topic:
     """Where the overhead camera has seen a robot's reference dot so far."""
-    return Topic(f"overhead/{robot}/path", "nav_msgs/msg/Path", LATCHED)
+    return Topic(f"overhead/{robot}/path", "nav_msgs/msg/Path", GROWING)
 
 
 def formation_done(robot: str, formation: str = FORMATION, *, listeners: tuple[str, ...] = ("fine_tuner",)) -> Topic:

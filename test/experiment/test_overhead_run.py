@@ -128,7 +128,8 @@ class Station:
         self.sent: list[tuple[str, Any]] = []
         self.said: list[str] = []
         self.component.attach(
-            lambda topic, message: self.sent.append((topic.name, message)), lambda level, text: self.said.append(text)
+            lambda topic, message: self.sent.append((topic.name, conversions.as_message(message, topic.type))),
+            lambda level, text: self.said.append(text),
         )
         ((self.topic, self.take),) = [(entry.topic, entry.handler) for entry in self.component.inputs()]
 

@@ -24,6 +24,7 @@ QOS = {
     "event": names.EVENT,
     "history": names.HISTORY,
     "latched": names.LATCHED,
+    "growing": names.GROWING,
     "clock": names.CLOCK,
     "status": names.STATUS,
 }
