@@ -35,6 +35,9 @@ NOTEBOOK = "__main__:"
 FAILURES = (Exception, SystemExit)
 """What a class from outside may raise, whatever it does; an interrupt is the user's."""
 
+LOADED: set[str] = set()
+"""Names of the classes from outside that this process has loaded."""
+
 _CLASS = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 _SUBJECT = re.compile(r"\w+ '[^']*'")
 
@@ -115,6 +118,7 @@ def load(kind: str, name: str) -> type:
         raise PluginError(f"{subject}: module '{module}' has no '{attribute}'")
     if not isinstance(found, type):
         raise PluginError(f"{subject}: '{value}' is no class")
+    LOADED.add(name)
     return found
 
 

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from robot_formation import conversions, exit_codes
+from robot_formation import conversions, exit_codes, plugins
 from robot_formation.bag.bag_path import PathReservation, check_free
 from robot_formation.bag.message_recorder import Recorder
 from robot_formation.bag.write_options import DEFAULT_OPTIONS, WriteOptions
@@ -28,6 +28,7 @@ from robot_formation.experiment.scenario import Scenario
 from robot_formation.names import IMAGE_TYPE, Message, Topic, absolute
 from robot_formation.plugins import PluginError
 from robot_formation.schedule.schedules import Spacing
+from robot_formation.system.files import flush_open_files
 from robot_formation.system.garbage import rare_collections
 from robot_formation.world.events import RobotPose
 
@@ -198,4 +199,6 @@ def run_in_process(
             code, reason = exit_codes.NODE_DIED, str(error)
         except KeyboardInterrupt:
             code, reason = exit_codes.INTERRUPTED, "interrupted"
+        if plugins.LOADED:  # what they have opened goes with the run, which refers to itself
+            flush_open_files()
     return RunResult(code, bag, reason, run.warnings, running_s=time.monotonic() - began)

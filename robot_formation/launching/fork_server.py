@@ -13,7 +13,6 @@ import ctypes
 import gc
 import importlib
 import inspect
-import io
 import json
 import os
 import select
@@ -31,6 +30,7 @@ from robot_formation import exit_codes
 from robot_formation.errors import FormationError
 from robot_formation.experiment.run_result import RunError
 from robot_formation.launching.outcome import manner
+from robot_formation.system.files import flush_open_files
 from robot_formation.system.garbage import rare_collections
 
 _PR_SET_PDEATHSIG = 1
@@ -39,8 +39,6 @@ _PR_GET_CHILD_SUBREAPER = 37
 _ADOPTION_S = 5.0
 _END_S = 5.0
 _POLL_S = 0.1
-_FILE = io.IOBase.__base__ or io.IOBase
-"""Base of all open files without the hooks of an abstract class, which may fail at classes from outside."""
 _COMMON = ("robot_formation.nodes.executables", "robot_formation.nodes.host.component_node")
 """Modules that all nodes need; what only some need is imported before the first of these is forked."""
 _RECORDER = "robot_formation.nodes.recorder.recorder_node"
@@ -239,21 +237,10 @@ def _node(*, executable: str, arguments: list[str], log: str, farewell: bool, la
     if not farewell:
         end_without_farewell(launcher)
     code = int(getattr(executables, executable)())
-    with bounded_end():  # a pipe that nobody reads takes no more
-        _flush_files()
+    # This process leaves without Python's end, which would close them. A pipe that nobody reads takes no more.
+    with bounded_end():
+        flush_open_files()
     return code
-
-
-def _flush_files() -> None:
-    """Write what open files still hold: this process leaves without Python's end, which would close them.
-
-    A class from outside may have left a file open. Compressed ones stay without their end.
-    """
-    # What was imported before the fork is frozen, and not among these objects.
-    for thing in gc.get_objects():
-        if issubclass(type(thing), _FILE):
-            with contextlib.suppress(Exception, SystemExit):  # closed, a full disk, or a class from outside again
-                thing.flush()
 
 
 if __name__ == "__main__":

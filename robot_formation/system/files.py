@@ -1,4 +1,4 @@
-"""Opening files that somebody else named, regular files of a bounded size only; and writing files whole.
+"""Opening files that somebody else named, regular files of a bounded size only; writing files whole; and flushing.
 
 A named pipe would be waited for without end, and a device such as /dev/zero has none.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import gc
 import io
 import os
 import stat
@@ -27,6 +28,23 @@ _KINDS = (
     (stat.S_ISBLK, errno.EINVAL, "Is a device, not a file"),
     (stat.S_ISSOCK, errno.EINVAL, "Is a socket, not a file"),
 )
+
+
+_OPEN_FILE = io.IOBase.__base__ or io.IOBase
+"""Base of all open files without the hooks of an abstract class, which may fail at classes from outside."""
+
+
+def flush_open_files() -> None:
+    """Write what open files still hold that a class from outside has left open. Compressed ones stay without their end.
+
+    For where such files are not closed in good order: in a process that leaves without Python's end, and before an
+    object that holds one goes in a cycle of references, of which Python may close the raw file before its buffer.
+    Frozen objects are left out.
+    """
+    for thing in gc.get_objects():
+        if issubclass(type(thing), _OPEN_FILE):
+            with contextlib.suppress(Exception, SystemExit):  # closed, a full disk, or a class from outside again
+                thing.flush()
 
 
 def open_file(path: str | Path) -> BinaryIO:

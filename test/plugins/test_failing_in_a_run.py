@@ -11,10 +11,13 @@ from repository import ROOT
 FAILING = """
 log = open("log.txt", "w")
 class Failing:
-    count = 0
+    def __init__(self):
+        self.count = 0
+        self.own = open("own.txt", "w")
     def observe(self, displacement):
         self.count += 1
         print(self.count, file=log)
+        print(self.count, file=self.own)
     def forecast(self):
         return [0.0, 0.05 / (3 - self.count)]
 """
@@ -40,10 +43,13 @@ def test_the_run_ends_as_if_its_node_had_died_in_process_and_over_the_graph(tmp_
     assert (found["outcome"], found["reason"]) == ("incomplete", REASON)
     assert isinstance(found["timesteps"], list)
     assert len(found["timesteps"]) == 3
-    assert (tmp_path / "log.txt").read_text().split() == ["1", "2", "3"]  # never closed: Python's end writes it
-    (tmp_path / "log.txt").unlink()
+    logs = [tmp_path / name for name in ("log.txt", "own.txt")]  # never closed
+    for log in logs:
+        assert log.read_text().split() == ["1", "2", "3"]
+        log.unlink()
     graph_said, graph_found = run(tmp_path, "graph")
-    assert (tmp_path / "log.txt").read_text().split() == ["1", "2", "3"]
+    for log in logs:
+        assert log.read_text().split() == ["1", "2", "3"]
     assert graph_found["timesteps"] == found["timesteps"]
     assert REASON in str(graph_found["reason"])
     assert graph_said.count("ZeroDivisionError") == 1, graph_said
