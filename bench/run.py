@@ -26,16 +26,17 @@ from robot_formation.analysis.from_bag import load_run
 AIMS = {"stream": 10.0, "on_demand": 20.0}
 START_AIM_S, END_AIM_S, IN_PROCESS_AIM_S, MEMORY_AIM_MB = 1.5, 0.3, 1.3, 350.0
 IN_PROCESS = """
-import gc, os, resource, sys, time
+import os, resource, sys, time
 from pathlib import Path
 from robot_formation.system.garbage import rare_collections
 from robot_formation.system.threads import one_thread
-os.environ.update(one_thread(os.environ))  # as `formation run` does, which also has the two lines about garbage
+os.environ.update(one_thread(os.environ))  # as `formation run` begins
 with rare_collections():
+    from robot_formation.cli.run import import_before_the_users
+    import_before_the_users(in_process=True, own_process=True)
     from robot_formation.experiment import scenario as scenarios
     from robot_formation.experiment.in_process import run_in_process
     from robot_formation.launching.processes import run_metadata
-    gc.freeze()
     scenario = scenarios.override(scenarios.load_track("two"), sys.argv[2:])
     result = run_in_process(scenario, Path(sys.argv[1]), run_metadata(scenario))
 print(result.running_s, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)

@@ -106,11 +106,7 @@ def run(args: argparse.Namespace) -> int:
 
     tracing = TracingFiles()  # before anything of ROS is loaded
     try:
-        import_before_the_users(args.in_process)
-        if args.own_process:
-            # Collections, the one at Python's end above all, needn't look at what is imported. What is loaded from here
-            # on may be the user's, and is collected.
-            gc.freeze()
+        import_before_the_users(in_process=args.in_process, own_process=args.own_process)
         scenario = build_scenario(args)
         check_stand_ins(args, scenario)
         require("ros", *(() if WORLD_NODE in args.without else ("sim",)))
@@ -148,8 +144,11 @@ def run(args: argparse.Namespace) -> int:
     return result.exit_code
 
 
-def import_before_the_users(in_process: bool) -> None:
+def import_before_the_users(*, in_process: bool, own_process: bool) -> None:
     """Import what is large and the package's own, before a class of the user's is loaded.
+
+    In the command's own process collections leave out what is there by then, the one at Python's end above all. What is
+    loaded later may be the user's, and is collected.
 
     Raises:
         FormationError: ROS or the simulator isn't installed, or shared memory is full.
@@ -160,6 +159,8 @@ def import_before_the_users(in_process: bool) -> None:
     if in_process:
         require("ros", "sim")
         importlib.import_module("robot_formation.experiment.in_process")
+    if own_process:
+        gc.freeze()
 
 
 def build_scenario(args: argparse.Namespace) -> Scenario:
